@@ -1,0 +1,1 @@
+"""tissuejax: find what your tissue model left out."""

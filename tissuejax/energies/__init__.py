@@ -1,0 +1,1 @@
+"""Strain energies, one a file, found by walking this folder."""

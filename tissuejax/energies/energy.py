@@ -1,0 +1,36 @@
+"""What every strain energy is: parameters as data and one function, the energy itself."""
+
+import abc
+from collections.abc import Mapping
+from typing import ClassVar
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+from tissuejax.energies.strain import Strain
+from tissuejax.parameters import Parameter
+
+
+class Energy(eqx.Module):
+    """A strain energy per reference volume. Stresses and tangents are its derivatives (`stress.py`)."""
+
+    name: ClassVar[str]
+    formula: ClassVar[str]
+    source: ClassVar[str]
+
+    @property
+    @abc.abstractmethod
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Declared parameters, in order."""
+
+    @abc.abstractmethod
+    def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+        """Isochoric energy psi_iso in J/m^3 = Pa; zero at rest."""
+
+    @abc.abstractmethod
+    def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+        """Shear modulus at rest, Pa."""
+
+    def margin(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+        """Positive inside the valid range of strains; energies that end somewhere say where."""
+        return 1.0 + 0.0 * strain.J

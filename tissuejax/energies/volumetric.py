@@ -1,0 +1,89 @@
+"""Volumetric energies U(J), named by their form; all are zero with zero slope at J = 1.
+
+The forms met in the field (source-facts): K/2 (J-1)^2, K/2 ln(J)^2 and ABAQUS's sum_i (J-1)^(2i) / D_i.
+"""
+
+import abc
+from collections.abc import Mapping
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from tissuejax.parameters import Parameter
+
+
+class Volumetric(eqx.Module):
+    """A volumetric energy per reference volume."""
+
+    name: ClassVar[str]
+    formula: ClassVar[str]
+
+    @property
+    @abc.abstractmethod
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Declared parameters."""
+
+    @abc.abstractmethod
+    def energy(self, p: Mapping[str, Array], J: Float[Array, "..."]) -> Float[Array, "..."]:
+        """U(J), Pa."""
+
+    @abc.abstractmethod
+    def bulk_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+        """Initial bulk modulus U''(1), Pa."""
+
+
+class Quadratic(Volumetric):
+    """U = K/2 (J-1)^2."""
+
+    name: ClassVar[str] = "quadratic"
+    formula: ClassVar[str] = "K/2 (J-1)^2"
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter("K", "Pa", 20e3, lower=0.0, meaning="bulk modulus"),)
+
+    def energy(self, p: Mapping[str, Array], J: Float[Array, "..."]) -> Float[Array, "..."]:
+        return 0.5 * p["K"] * (J - 1) ** 2
+
+    def bulk_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+        return p["K"]
+
+
+class Logarithmic(Volumetric):
+    """U = K/2 ln(J)^2."""
+
+    name: ClassVar[str] = "logarithmic"
+    formula: ClassVar[str] = "K/2 ln(J)^2"
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter("K", "Pa", 20e3, lower=0.0, meaning="bulk modulus"),)
+
+    def energy(self, p: Mapping[str, Array], J: Float[Array, "..."]) -> Float[Array, "..."]:
+        return 0.5 * p["K"] * jnp.log(J) ** 2
+
+    def bulk_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+        return p["K"]
+
+
+class Compressibility(Volumetric):
+    """U = sum_i (J-1)^(2i) / D_i, ABAQUS's form; bulk modulus 2 / D_1."""
+
+    name: ClassVar[str] = "compressibility"
+    formula: ClassVar[str] = "sum_i (J-1)^(2i) / D_i"
+    order: int = 1
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return tuple(
+            Parameter(f"D{i}", "1/Pa", 1e-4, lower=0.0, meaning=f"compressibility of (J-1)^{2 * i}")
+            for i in range(1, self.order + 1)
+        )
+
+    def energy(self, p: Mapping[str, Array], J: Float[Array, "..."]) -> Float[Array, "..."]:
+        return sum((J - 1) ** (2 * i) / p[f"D{i}"] for i in range(1, self.order + 1))
+
+    def bulk_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+        return 2 / p["D1"]

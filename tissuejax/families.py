@@ -1,0 +1,37 @@
+"""Families found by walking their folder: adding a member is adding a file, no list is kept by hand."""
+
+import importlib
+import inspect
+import pkgutil
+from types import ModuleType
+
+from tissuejax.errors import unknown
+
+
+def members(package: ModuleType, kind: type) -> dict[str, type]:
+    """All final subclasses of `kind` defined in the modules of `package`, by their `name`.
+
+    Args:
+        package: the folder to walk, one member a file.
+        kind: the abstract class that members derive from; a member declares `name`.
+
+    Raises:
+        RuntimeError: two members share one name.
+    """
+    found: dict[str, type] = {}
+    for info in sorted(pkgutil.iter_modules(package.__path__), key=lambda i: i.name):
+        module = importlib.import_module(f"{package.__name__}.{info.name}")
+        for _, member in inspect.getmembers(module, inspect.isclass):
+            if member.__module__ != module.__name__ or not issubclass(member, kind) or inspect.isabstract(member):
+                continue
+            if member.name in found:
+                raise RuntimeError(f"two members named {member.name!r}: {found[member.name]} and {member}")
+            found[member.name] = member
+    return found
+
+
+def lookup(kind: str, name: str, found: dict[str, type]) -> type:
+    """The member called `name`, or an error that offers the nearest names."""
+    if name not in found:
+        raise unknown(kind, name, found)
+    return found[name]
