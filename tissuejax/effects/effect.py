@@ -28,8 +28,8 @@ class Effect(eqx.Module):
 
     Hooks, in the order in which a material test applies them; each is the identity unless overridden:
         `stretch` (rig: what the specimen really saw), `energy` (added strain energy), `memory` (isochoric stress with
-        history), `stress` (rig and sensor: what the cell reports). Probing: `scene` (the physical set-up: probe path, support,
-        stiffness field, contact law, memory...), `channels` (sensors).
+        history), `stress` (rig and sensor: what the cell reports). Probing: `scene` (the physical set-up: probe
+        path, support, stiffness field, contact law, memory...), `channels` (sensors).
     """
 
     name: ClassVar[str]
