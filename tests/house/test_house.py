@@ -1,0 +1,127 @@
+"""The properties of the house: floors, file lengths, discovery, docstrings, and a README whose code runs."""
+
+import ast
+import importlib
+import inspect
+import pkgutil
+import re
+from pathlib import Path
+
+import pytest
+
+import tissuejax
+
+ROOT = Path(tissuejax.__file__).parent
+PROJECT = ROOT.parent
+FLOORS = [
+    {"errors", "families", "parameters", "tensors", "units", "progress", "storage", "cache"},
+    {"energies"},
+    {"recordings"},
+    {"mesh"},
+    {"elements"},
+    {"tled"},
+    {"effects"},
+    {"model"},
+    {"experiments"},
+    {"fitting"},
+    {"diagnosis"},
+    {"report"},
+    {"challenge"},
+    {"commands", "verbs"},
+    {"cli"},
+]
+FLOOR_OF = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
+FILES = sorted(p for p in ROOT.rglob("*.py"))
+OURS = sorted(
+    p for folder in (ROOT, PROJECT / "tests", PROJECT / "fits", PROJECT / "data") for p in folder.rglob("*.py")
+)
+
+
+def room(path: Path) -> str:
+    return path.relative_to(ROOT).parts[0].removesuffix(".py")
+
+
+def imported(path: Path) -> set[str]:
+    """Rooms of this package that a file imports, at top level or inside a function."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names = [a.name for a in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            names = [f"{node.module}.{a.name}" for a in node.names]
+        else:
+            continue
+        found |= {n.split(".")[1] for n in names if n.startswith("tissuejax.")}
+        found |= {"<root>" for n in names if n == "tissuejax"}
+    return found
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_run_down_the_floors(path):
+    here = room(path)
+    if here == "__init__":  # the front door names everything, by design
+        return
+    assert here in FLOOR_OF, f"{here} has no floor: add it to FLOORS and to the README"
+    for other in imported(path):
+        assert other in FLOOR_OF, f"{path} imports {other}, which has no floor"
+        climbs = FLOOR_OF[other] > FLOOR_OF[here] or (FLOOR_OF[other] == FLOOR_OF[here] != 0 and other != here)
+        assert not climbs, f"{here} (floor {FLOOR_OF[here]}) imports {other} (floor {FLOOR_OF[other]})"
+
+
+def test_the_floor_test_sees_a_climber(tmp_path):
+    climber = tmp_path / "climber.py"
+    climber.write_text("def f():\n    from tissuejax.cli import main\n    return main\n")
+    assert imported(climber) == {"cli"}
+    assert FLOOR_OF["cli"] > FLOOR_OF["energies"]
+
+
+def test_only_the_report_room_knows_matplotlib():
+    knows = {room(p) for p in FILES if re.search(r"^\s*(import|from) matplotlib", p.read_text(), re.M)}
+    assert knows <= {"report"}
+
+
+def test_file_lengths():
+    lengths = {p.relative_to(PROJECT): len(p.read_text().splitlines()) for p in OURS}
+    long = {str(p): n for p, n in lengths.items() if n > 400}
+    assert not long, f"over 400 lines: {long}"
+    package = sorted(n for p, n in lengths.items() if p.parts[0] == "tissuejax" and p.name != "__init__.py")
+    assert package[len(package) // 2] <= 160, "median file has grown past 160 lines (design: near 120)"
+
+
+def test_no_vague_names():
+    vague = {"utils", "helpers", "base", "misc", "common"}
+    assert not [p for p in FILES if p.stem in vague]
+
+
+def public_objects():
+    for info in pkgutil.walk_packages(tissuejax.__path__, "tissuejax."):
+        module = importlib.import_module(info.name)
+        yield info.name, module
+        for name, member in vars(module).items():
+            if name.startswith("_") or getattr(member, "__module__", None) != info.name:
+                continue
+            if inspect.isclass(member) or inspect.isfunction(member):
+                yield f"{info.name}.{name}", member
+
+
+def test_public_docstrings():
+    bare = [name for name, member in public_objects() if not (inspect.getdoc(member) or "").strip()]
+    assert not bare, f"without a docstring: {bare}"
+
+
+def test_readme_code_runs(tmp_path, monkeypatch):
+    text = (PROJECT / "README.md").read_text()
+    blocks = re.findall(r"```python\n(.*?)```", text, re.S)
+    assert blocks, "the README shows no Python"
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "data").symlink_to(PROJECT / "data")
+    for block in blocks:
+        exec(compile(block, "README.md", "exec"), {"__name__": "readme"})
+
+
+def test_no_registry_host_and_no_machine_path_in_the_project_files():
+    for name in ("pyproject.toml", "Makefile", ".ci/run", "README.md"):
+        text = (PROJECT / name).read_text()
+        assert not re.search(r"https?://[^\s)]*(pypi|pythonhosted|npmjs|debian)", text), name
+    parent = f"{PROJECT.parent}/"
+    assert not [p for p in OURS if parent in p.read_text()]
