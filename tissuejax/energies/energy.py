@@ -16,7 +16,9 @@ class Energy(eqx.Module):
 
     name: ClassVar[str]
     formula: ClassVar[str]
+    shear_modulus: ClassVar[str]  # at rest, as a formula in the parameters
     source: ClassVar[str]
+    valid: ClassVar[str] = "all stretches"
 
     @property
     @abc.abstractmethod

@@ -18,6 +18,7 @@ class ReducedPolynomial(Energy):
 
     name: ClassVar[str] = "reduced-polynomial"
     formula: ClassVar[str] = "sum_i C_i0 (I1bar - 3)^i"
+    shear_modulus: ClassVar[str] = "2 C10"
     source: ClassVar[str] = "Yeoh 1993; Lister 2012, table 2.3"
     order: int = 3
 

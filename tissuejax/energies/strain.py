@@ -28,9 +28,13 @@ class Strain(eqx.Module):
     @property
     def I1(self) -> Float[Array, "..."]:
         """Isochoric first invariant J^(-2/3) tr C; 3 at rest."""
-        return self.J ** (-2 / 3) * trace(self.C)
+        return self._power_of_J(-2 / 3) * trace(self.C)
 
     @property
     def I2(self) -> Float[Array, "..."]:
         """Isochoric second invariant J^(-4/3) (tr(C)^2 - tr(C^2)) / 2; 3 at rest."""
-        return self.J ** (-4 / 3) * 0.5 * (trace(self.C) ** 2 - trace_of_square(self.C))
+        return self._power_of_J(-4 / 3) * 0.5 * (trace(self.C) ** 2 - trace_of_square(self.C))
+
+    def _power_of_J(self, exponent: float) -> Float[Array, "..."]:
+        """J^exponent as exp(exponent ln J): its derivative reuses the exponential (cheap stress)."""
+        return jnp.exp(exponent * jnp.log(self.J))
