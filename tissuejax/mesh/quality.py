@@ -1,0 +1,157 @@
+"""Is this mesh fit for a simulation? A report in numbers, and a refusal that names the place."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from tissuejax.errors import InputError
+from tissuejax.recordings.recording import Geometry
+
+SMALLEST, LARGEST = 1e-3, 2.0  # m: an organ or specimen outside this has its units wrong
+CORNERS = {  # for each corner the three neighbours, right-handed
+    "hexahedron": (
+        (0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7), (4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3)
+    ),
+    "tetra": ((0, 1, 2, 3),),
+}  # fmt: skip
+
+
+class Quality(NamedTuple):
+    """What a mesh is like.
+
+    Attributes:
+        n_points, n_cells: counts.
+        volume: m^3.
+        size: extent of the bounding box, m.
+        smallest_edge: m.
+        worst_jacobian: smallest scaled corner Jacobian (1 is a cube, 0 is flat) and its cell.
+        worst_aspect: largest ratio of longest to shortest edge and its cell.
+    """
+
+    n_points: int
+    n_cells: int
+    volume: float
+    size: tuple[float, float, float]
+    smallest_edge: float
+    worst_jacobian: tuple[float, int]
+    worst_aspect: tuple[float, int]
+
+    def __str__(self) -> str:
+        x, y, z = (1e3 * s for s in self.size)
+        return (
+            f"{self.n_cells} cells, {self.n_points} points, {x:.1f} x {y:.1f} x {z:.1f} mm, {1e6 * self.volume:.2f} ml"
+            f"; shortest edge {1e3 * self.smallest_edge:.3g} mm; worst scaled Jacobian {self.worst_jacobian[0]:.2f} "
+            f"(cell {self.worst_jacobian[1]}); worst aspect {self.worst_aspect[0]:.1f} (cell {self.worst_aspect[1]})"
+        )
+
+
+def corner_jacobians(points: Float[np.ndarray, "N 3"], cells: Int[np.ndarray, "E k"], cell_type: str):
+    """Scaled Jacobian (triple product of unit edges) at each corner of each cell."""
+    x = np.asarray(points)[cells]
+    columns = []
+    for a, b, c, d in CORNERS[cell_type]:
+        edges = x[:, [b, c, d]] - x[:, [a]]
+        lengths = np.linalg.norm(edges, axis=2)
+        columns.append(np.linalg.det(edges) / np.maximum(np.prod(lengths, 1), 1e-300))
+    return np.stack(columns, 1)
+
+
+def cell_volumes(points: Float[np.ndarray, "N 3"], cells: Int[np.ndarray, "E k"], cell_type: str):
+    """Volume of each cell, m^3: exact for tets, one-point (which is what the solver integrates) for hexes."""
+    x = np.asarray(points)[cells]
+    if cell_type == "tetra":
+        return np.linalg.det(x[:, 1:] - x[:, :1]) / 6
+    signs = np.array([[-1, 1, 1, -1, -1, 1, 1, -1], [-1, -1, 1, 1, -1, -1, 1, 1], [-1, -1, -1, -1, 1, 1, 1, 1]])
+    return np.linalg.det(np.einsum("ja,eai->eji", signs, x) / 8) * 8
+
+
+def quality(geometry: Geometry) -> Quality:
+    """Measure a mesh."""
+    points, cells = np.asarray(geometry.points), np.asarray(geometry.cells)
+    jacobian = corner_jacobians(points, cells, geometry.cell_type).min(1)
+    pairs = [(a, b) for a, *rest in CORNERS[geometry.cell_type] for b in rest]
+    if geometry.cell_type == "tetra":
+        pairs += [(1, 2), (1, 3), (2, 3)]
+    edges = np.stack([np.linalg.norm(points[cells[:, a]] - points[cells[:, b]], axis=1) for a, b in pairs], 1)
+    aspect = edges.max(1) / np.maximum(edges.min(1), 1e-300)
+    return Quality(
+        len(points),
+        len(cells),
+        float(cell_volumes(points, cells, geometry.cell_type).sum()),
+        tuple(float(s) for s in np.ptp(points, axis=0)),
+        float(edges.min()),
+        (float(jacobian.min()), int(jacobian.argmin())),
+        (float(aspect.max()), int(aspect.argmax())),
+    )
+
+
+def _place(points, index) -> str:
+    x, y, z = 1e3 * np.asarray(points)[index].reshape(-1, 3).mean(0)
+    return f"({x:.1f}, {y:.1f}, {z:.1f}) mm"
+
+
+def refuse_bad(geometry: Geometry, needs_support: bool = True) -> Quality:
+    """Measure a mesh and refuse one that can't be simulated, with the place.
+
+    Args:
+        geometry: points, cells and fixed nodes.
+        needs_support: whether the fixed nodes have to hold the body against floating.
+
+    Raises:
+        InputError: an index out of range, a size that means wrong units, an inverted or flat cell, points in no cell,
+            a body in several pieces, no fixed node, or fixed nodes that let the body float.
+    """
+    points, cells, fixed = (np.asarray(a) for a in (geometry.points, geometry.cells, geometry.fixed))
+    if not len(cells) or cells.min() < 0 or cells.max() >= len(points):
+        raise InputError(f"cells name nodes outside 0..{len(points) - 1} (or there are none); check the numbering")
+    if not np.isfinite(points).all():
+        raise InputError(f"point {int(np.argwhere(~np.isfinite(points))[0, 0])} is not finite; repair the mesh")
+    extent = np.ptp(points, axis=0).max()
+    if not SMALLEST <= extent <= LARGEST:
+        raise InputError(
+            f"the body is {extent:.4g} m long; expected between {SMALLEST} and {LARGEST} m. "
+            "Lengths are metres: were millimetres given as metres (or the reverse)?"
+        )
+    worst = corner_jacobians(points, cells, geometry.cell_type)
+    bad = np.flatnonzero((worst.min(1) <= 1e-3) | (cell_volumes(points, cells, geometry.cell_type) <= 0))
+    if len(bad):
+        raise InputError(
+            f"{len(bad)} of {len(cells)} cells are inverted or flat, first cell {bad[0]} at "
+            f"{_place(points, cells[bad[0]])}; check node order or remesh there"
+        )
+    lonely = np.setdiff1d(np.arange(len(points)), cells)
+    if len(lonely):
+        raise InputError(
+            f"{len(lonely)} points belong to no cell, first point {lonely[0]} at {_place(points, lonely[:1])}; "
+            "remove them"
+        )
+    star = coo_array(
+        (np.ones(cells[:, 1:].size), (np.repeat(cells[:, 0], cells.shape[1] - 1), cells[:, 1:].ravel())),
+        shape=(len(points), len(points)),
+    )
+    pieces, label = connected_components(star, directed=False)
+    if pieces > 1:
+        small = np.flatnonzero(label == np.bincount(label).argmin())
+        raise InputError(
+            f"the mesh is in {pieces} pieces; the smallest has {len(small)} points near {_place(points, small)}; "
+            "merge coincident nodes or remove the piece"
+        )
+    if needs_support:
+        _refuse_floating(points, fixed)
+    return quality(geometry)
+
+
+def _refuse_floating(points, fixed) -> None:
+    if not len(fixed):
+        raise InputError("no fixed node: the body would float away; name the nodes that the support holds")
+    if fixed.min() < 0 or fixed.max() >= len(points):
+        raise InputError(f"fixed nodes outside 0..{len(points) - 1}; check the numbering")
+    spread = np.linalg.svd(points[fixed] - points[fixed].mean(0), compute_uv=False)
+    if len(fixed) < 3 or spread[1] < 1e-3 * np.ptp(points, axis=0).max():
+        raise InputError(
+            f"the {len(fixed)} fixed nodes near {_place(points, fixed)} lie on a point or a line, so the body floats "
+            "(it can turn); fix at least three nodes that are not in line"
+        )
