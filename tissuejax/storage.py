@@ -1,0 +1,96 @@
+"""Files written whole or not at all.
+
+Every writer works on a temporary file in the same folder and renames it into place (`os.replace` is atomic within a
+file system), so that a reader, a second run or an interruption never meets half a result.
+"""
+
+import json
+import math
+import os
+import secrets
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from tissuejax.errors import InputError
+
+
+@contextmanager
+def replacing(path: str | os.PathLike) -> Iterator[Path]:
+    """A temporary path beside `path`; it becomes `path` when the block ends, and is removed if the block fails.
+
+    The ending is kept, because several libraries choose the format by it. Missing folders are made.
+
+    Raises:
+        InputError: the folder can't be made or written.
+    """
+    path = Path(path)
+    temporary = path.with_name(f".{secrets.token_hex(6)}.{path.name}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            yield temporary
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except (PermissionError, NotADirectoryError, IsADirectoryError, FileExistsError) as error:
+        raise InputError(f"{path}: can't be written ({error.strerror}); name another output file or folder") from error
+
+
+def write_bytes(path: str | os.PathLike, content: bytes) -> Path:
+    """Write `content` atomically; returns the path."""
+    with replacing(path) as temporary, open(temporary, "wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    return Path(path)
+
+
+def write_text(path: str | os.PathLike, content: str) -> Path:
+    """Write `content` as UTF-8 atomically; returns the path."""
+    return write_bytes(path, content.encode("utf-8"))
+
+
+def write_json(path: str | os.PathLike, content: object) -> Path:
+    """Write `content` as indented JSON atomically; arrays become lists, NaN and infinities become null."""
+    return write_text(path, json.dumps(plain(content), indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+
+
+def write_npz(path: str | os.PathLike, arrays: Mapping[str, np.ndarray]) -> Path:
+    """Write named arrays as a compressed npz atomically; returns the path (ending .npz)."""
+    path = Path(path) if str(path).endswith(".npz") else Path(f"{path}.npz")
+    with replacing(path) as temporary:
+        np.savez_compressed(temporary, **{name: np.asarray(array) for name, array in arrays.items()})
+    return path
+
+
+def write_figure(path: str | os.PathLike, figure: object, **options: object) -> Path:
+    """Save a figure (anything with `savefig`) atomically, in the format its ending names; `options` go to it."""
+    with replacing(path) as temporary:
+        figure.savefig(temporary, **options)
+    return Path(path)
+
+
+def plain(content: object) -> object:
+    """`content` in the types JSON knows: numpy and JAX arrays as lists, paths as text, non-finite numbers as None.
+
+    Raises:
+        TypeError: an object with no such form.
+    """
+    if content is None or isinstance(content, str | bool | int):
+        return content
+    if isinstance(content, float):
+        return content if math.isfinite(content) else None
+    if isinstance(content, Mapping):
+        return {str(key): plain(value) for key, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [plain(value) for value in content]
+    if isinstance(content, set | frozenset):
+        return [plain(value) for value in sorted(content)]
+    if isinstance(content, os.PathLike):
+        return os.fspath(content)
+    if hasattr(content, "__array__"):
+        return plain(np.asarray(content).tolist())
+    raise TypeError(f"{type(content).__name__} has no JSON form: {content!r}")
