@@ -1,0 +1,139 @@
+"""What a diagnosis needs of an experiment: measured series, parameters, a prediction and its derivatives.
+
+The engine (score, refit, selection, verdict) knows no mechanics. A `Bench` puts a sample on the table: all its
+channels as one long vector cut into `Segment`s, a base model with its parameters, and `Candidate`s, each a set of
+parameter paths that are neutral until freed. Material tests and probings are two benches.
+"""
+
+import abc
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One scalar series: a component of a channel of a recording.
+
+    Attributes:
+        recording, channel, component: where it belongs; component is "" for a scalar channel.
+        rows: its place in the long vector.
+        time: s.
+        unit: SI unit of the values.
+        drive: what was done at these times (stretch, shear, or depth in m), to locate by.
+        drive_name, drive_unit: what the drive is called.
+    """
+
+    recording: str
+    channel: str
+    component: str
+    rows: slice
+    time: Float[np.ndarray, " n"]
+    unit: str
+    drive: Float[np.ndarray, " n"]
+    drive_name: str = "stretch"
+    drive_unit: str = "1"
+
+    @property
+    def label(self) -> str:
+        """Channel and component in words."""
+        return f"{self.channel} {self.component}".strip()
+
+
+@dataclass(frozen=True)
+class Free:
+    """A parameter a refit may move: its range, how it is scaled, and whether in logarithm.
+
+    Attributes:
+        lower, upper: range allowed in a fit.
+        scale: typical step.
+        log: fitted as its logarithm (positive over decades: times, rates, periods).
+        prior: (mean, standard deviation) or None.
+    """
+
+    lower: float
+    upper: float
+    scale: float
+    unit: str = "1"
+    log: bool = False
+    prior: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One answer to "what is missing?".
+
+    Attributes:
+        name: of the effect (two candidates may share one: forms of one effect compete inside it).
+        amplitudes: paths that are zero at neutral.
+        shapes: paths that mean nothing while the amplitudes are zero, scanned over `grid`.
+        grid: settings of the shapes (and, where the effect has no derivative at zero, of amplitudes) to start from.
+        cost: relative price of a refit, for benches where a prediction is a simulation.
+    """
+
+    name: str
+    amplitudes: tuple[str, ...]
+    shapes: tuple[str, ...] = ()
+    grid: tuple[Mapping[str, float], ...] = ({},)
+    cost: float = 1.0
+    form: str = ""
+
+    @property
+    def key(self) -> str:
+        """Unique among candidates."""
+        return f"{self.name}/{self.form}" if self.form else self.name
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """All paths a refit frees."""
+        return (*self.amplitudes, *self.shapes)
+
+
+@dataclass
+class Bench(abc.ABC):
+    """A sample on the table.
+
+    Attributes:
+        segments: all measured series, fitted and held out.
+        y, sigma: measurements and standard deviations (noise and numerical error in quadrature), one long vector.
+        fitted, held_out: recordings by name; held_out may be empty.
+        base: paths of the base model.
+        free: every path that any refit may move.
+        start: neutral values of all paths.
+        candidates: by key.
+    """
+
+    segments: Sequence[Segment]
+    y: Float[np.ndarray, " N"]
+    sigma: Float[np.ndarray, " N"]
+    fitted: tuple[str, ...]
+    held_out: tuple[str, ...]
+    base: tuple[str, ...]
+    free: dict[str, Free]
+    start: dict[str, float]
+    candidates: dict[str, Candidate]
+    warnings: list[str] = field(default_factory=list)
+
+    @abc.abstractmethod
+    def predict(self, values: Mapping[str, float]) -> Float[np.ndarray, " N"]:
+        """All channels at `values` (absent paths are neutral)."""
+
+    @abc.abstractmethod
+    def jacobian(self, values: Mapping[str, float], paths: Sequence[str]) -> Float[np.ndarray, "N k"]:
+        """Derivative of the prediction with respect to `paths`."""
+
+    def columns(
+        self, values: Mapping[str, float], settings: Sequence[tuple[Mapping[str, float], str]]
+    ) -> Float[np.ndarray, "N k"]:
+        """Derivatives with respect to one path each, each at its own setting of shapes on top of `values`."""
+        return np.stack([self.jacobian({**values, **dict(s)}, [path])[:, 0] for s, path in settings], axis=1)
+
+    def mask(self, recordings: Sequence[str]) -> np.ndarray:
+        """Rows of the long vector that belong to `recordings`."""
+        out = np.zeros(len(self.y), bool)
+        for s in self.segments:
+            if s.recording in recordings:
+                out[s.rows] = True
+        return out
