@@ -19,8 +19,8 @@ def lobe_of_cloud(
     """The lobe under a cloud of its free surface, standing on z = 0.
 
     The outline is a truncated Fourier series of the cloud's largest radius by direction (star-shaped about its
-    middle); the height is a thin-plate spline with smoothing through at most 1500 of the points; the square grid reaches the outline
-    by a smooth square-to-disc map.
+    middle); the height is a thin-plate spline with smoothing through at most 1500 of the points; the square grid
+    reaches the outline by a smooth square-to-disc map.
 
     Args:
         cloud: points of the free surface, m, support at z = 0.
