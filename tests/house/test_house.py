@@ -14,7 +14,7 @@ import tissuejax
 ROOT = Path(tissuejax.__file__).parent
 PROJECT = ROOT.parent
 FLOORS = [
-    {"errors", "families", "parameters", "tensors", "units", "progress", "storage", "cache"},
+    {"errors", "families", "parameters", "tensors", "spectral", "units", "progress", "storage", "cache"},
     {"energies"},
     {"recordings"},
     {"mesh"},
