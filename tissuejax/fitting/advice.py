@@ -1,0 +1,94 @@
+"""What a careful colleague would say about a fit, in sentences."""
+
+import math
+from typing import TYPE_CHECKING
+
+from tissuejax.fitting.stability import unstable
+
+if TYPE_CHECKING:
+    from tissuejax.fitting.result import Fit
+
+MISFIT = 1.5  # chi-square per sample from which the misfit is called larger than the noise
+SERIAL = 0.5  # lag-one correlation of residuals from which standard errors are called optimistic
+CONDITION = 1e6
+
+
+def warnings_of(found: "Fit") -> list[str]:
+    """All warnings of a fit, the gravest first."""
+    problem, said = found.problem, []
+    if not found.converged:
+        said.append(f"Not converged: {found.status}. The numbers below are where the search stopped.")
+    for path, side in found.at_bound.items():
+        lower, upper = problem.bound(path)
+        limit = lower if side == "lower" else upper
+        unit = problem.predictor.model.parameters[path].unit
+        said.append(f"{path} ended at its {side} bound ({limit:g} {unit}); its standard error means little there.")
+    said += [sentence[0].upper() + sentence[1:] for sentence in found.uncertainty.sentences]
+    said += unstable(found)
+    said += _misfit(found)
+    said += _serial(found)
+    said += _held_out(found)
+    if found.uncertainty.condition > CONDITION and not found.uncertainty.sentences:
+        said.append(
+            f"The condition number is {found.uncertainty.condition:.1e}: some parameters trade off against each other; "
+            "see the correlation matrix."
+        )
+    if problem.noise.estimated:
+        levels = {g: problem.noise.std[key] for key, g in problem.noise.groups.items()}
+        text = ", ".join(f"{level:.3g} ({group})" for group, level in levels.items())
+        said.append(
+            f"The noise was not recorded; it was estimated from the residuals: {text}. "
+            "So chi-square says nothing on whether the model fits."
+        )
+    return said + _starts(found)
+
+
+def _misfit(found: "Fit") -> list[str]:
+    said = []
+    for key, s in found.channels.items():
+        if s.chi2_per_sample > MISFIT and key not in found.problem.noise.groups:
+            said.append(
+                f"{key}: the misfit is {math.sqrt(s.chi2_per_sample):.1f} times the noise (RMSE {s.rmse:.3g} "
+                f"{s.unit}): "
+                "the model lacks something. Standard errors were widened accordingly."
+            )
+    return said
+
+
+def _serial(found: "Fit") -> list[str]:
+    worst = max(found.channels.items(), key=lambda kv: kv[1].autocorrelation, default=None)
+    if worst is None or worst[1].autocorrelation < SERIAL:
+        return []
+    rho = min(worst[1].autocorrelation, 0.999)
+    factor = math.sqrt((1 + rho) / (1 - rho))
+    return [
+        f"Residuals of {worst[0]} are serially correlated ({rho:.2f} from one sample to the next), so samples are not "
+        f"independent and the standard errors are too small, by up to a factor of about {factor:.1f}."
+    ]
+
+
+def _held_out(found: "Fit") -> list[str]:
+    if not found.holdout or not found.channels:
+        return []
+    inside = max(s.chi2_per_sample for s in found.channels.values())
+    return [
+        f"{key} (held out) is predicted {math.sqrt(s.chi2_per_sample / inside):.1f} times worse than the fitted "
+        f"recordings: "
+        "the parameters do not carry over to it."
+        for key, s in found.holdout.items()
+        if inside > 0 and s.chi2_per_sample > 4 * max(inside, 1.0)
+    ]
+
+
+def _starts(found: "Fit") -> list[str]:
+    ends = [c for c in found.starts if math.isfinite(c)]
+    if len(found.starts) < 2 or not ends:
+        return []
+    best = min(ends)
+    same = sum(c <= best * (1 + 1e-3) + 1e-9 for c in ends)
+    if same > 1:
+        return []
+    return [
+        f"Only 1 of {len(found.starts)} starts reached the best fit: there are other minima; raise --multistart "
+        f"to be surer."
+    ]

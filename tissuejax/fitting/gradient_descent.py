@@ -1,0 +1,112 @@
+"""Descent by first derivatives, for problems with many parameters: Adam and L-BFGS of optax on the same misfit.
+
+Reverse mode gives the gradient at the cost of a few predictions whatever the number of parameters. Variables, bounds,
+priors and losses are those of the least squares (scaled so that one unit is a typical change).
+"""
+
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+from jaxtyping import Float
+
+from tissuejax.fitting.levenberg_marquardt import Descent
+from tissuejax.fitting.problem import Problem
+
+METHODS = ("adam", "lbfgs")
+RATE = 0.05  # of Adam, in scaled variables, falling to a hundredth by a cosine
+PATIENCE = 20  # steps without the asked decrease before L-BFGS is called converged
+
+
+def objective(problem: Problem) -> Callable[[Float[jax.Array, " p"]], Float[jax.Array, ""]]:
+    """Half the sum of the losses as a JAX function of the free variables y."""
+    box = problem.box
+    keys = list(problem.seen)
+    kept = [jnp.asarray(problem.seen[k]) for k in keys]
+    measured = [jnp.asarray(problem.measured[k][problem.seen[k]]) for k in keys]
+    fixed = {path: jnp.asarray(float(v)) for path, v in problem.start.items()}
+
+    def bounded(y):
+        x = box.scale * y
+        x = jnp.where(box.only_lower, jnp.where(box.only_lower, box.lower, 0) + box.scale * jax.nn.softplus(y), x)
+        x = jnp.where(box.only_upper, jnp.where(box.only_upper, box.upper, 0) - box.scale * jax.nn.softplus(-y), x)
+        low = jnp.where(box.both, box.lower, 0)
+        return jnp.where(box.both, low + box.span * jax.nn.sigmoid(y), x)
+
+    def loss(y):
+        x = bounded(y)
+        values = fixed | {path: x[i] for i, path in enumerate(problem.free)}
+        predicted = problem.predictor.predict(values)
+        total = 0.0
+        for (recording, channel), rows, seen in zip(keys, kept, measured, strict=True):
+            r = (predicted[recording].channels[channel].values.ravel()[rows] - seen) / problem.sigma(
+                (recording, channel)
+            )
+            total += jnp.sum(_rho(problem.loss, r * r))
+        for path, (mean, std) in problem.priors.items():
+            total += _rho(problem.loss, ((values[path] - mean) / std) ** 2)
+        return 0.5 * total
+
+    return loss
+
+
+def _rho(name: str, square):
+    if name == "soft-l1":
+        return 2 * (jnp.sqrt(1 + square) - 1)
+    return jnp.log1p(square) if name == "cauchy" else square
+
+
+def gradient_descent(
+    problem: Problem,
+    y: Float[np.ndarray, " p"],
+    method: str,
+    *,
+    max_steps: int,
+    tolerance: float,
+    on_accept: Callable[[int, float, np.ndarray], None] | None = None,
+) -> Descent:
+    """Minimise by "adam" (ten times `max_steps` steps) or "lbfgs" from the free variables `y`."""
+    loss = objective(problem)
+    steps = 10 * max_steps if method == "adam" else max_steps
+    if method == "adam":
+        optimiser = optax.adam(optax.cosine_decay_schedule(RATE, steps, alpha=0.01))
+    else:
+        optimiser = optax.lbfgs(memory_size=20)
+    gradient = jax.value_and_grad(loss)
+    known = optax.value_and_grad_from_state(loss)
+
+    @jax.jit
+    def step(y, state):
+        if method == "adam":
+            value, slope = gradient(y)
+            updates, state = optimiser.update(slope, state, y)
+        else:
+            value, slope = known(y, state=state)
+            updates, state = optimiser.update(slope, state, y, value=value, grad=slope, value_fn=loss)
+        return optax.apply_updates(y, updates), state, value
+
+    y = jnp.asarray(y)
+    state, best, trace, waited = optimiser.init(y), (np.inf, np.asarray(y)), [], 0
+    for n in range(1, steps + 1):
+        here = np.asarray(y)
+        y, state, value = step(y, state)
+        value = float(value)
+        if not np.isfinite(value):
+            if n == 1:
+                return Descent(here, np.inf, False, "the model has no finite prediction at the start", 1)
+            return Descent(
+                best[1], best[0], False, "the misfit became infinite; take a bounded or a nearer start", n, trace
+            )
+        enough = value < best[0] * (1 - tolerance)
+        waited = 0 if enough else waited + 1
+        if value < best[0]:
+            best = (value, here)
+            trace.append((value, here))
+            if on_accept is not None:
+                on_accept(n, value, here)
+        if waited >= PATIENCE and (method == "lbfgs" or n > steps // 2):
+            return Descent(best[1], best[0], True, "converged", n, trace)
+    done = method == "adam"  # Adam's schedule has come to rest
+    return Descent(best[1], best[0], done, "converged" if done else f"no convergence after {steps} steps", steps, trace)

@@ -1,0 +1,227 @@
+"""Fit: weighted nonlinear least squares from several starts, with noise from the residuals where none was recorded.
+
+`fit(problem)` is what commands and studies call. `descend(problem, start)` is the bare descent from one start, without
+uncertainties or scores, for callers that fit thousands of times: no compilation when model structure and (padded)
+lengths repeat.
+"""
+
+import time
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tissuejax.errors import InputError, NotConverged
+from tissuejax.fitting.advice import warnings_of
+from tissuejax.fitting.gradient_descent import METHODS as GRADIENT_METHODS
+from tissuejax.fitting.gradient_descent import gradient_descent
+from tissuejax.fitting.levenberg_marquardt import Descent, levenberg_marquardt
+from tissuejax.fitting.losses import soften
+from tissuejax.fitting.problem import Problem
+from tissuejax.fitting.result import Fit, Iterate
+from tissuejax.fitting.scores import scores
+from tissuejax.fitting.starts import scaled_to_data, variations
+from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
+
+if TYPE_CHECKING:
+    from tissuejax.experiments.predictor import Predictor
+
+METHODS = ("levenberg-marquardt", *GRADIENT_METHODS)
+AGAIN = 3  # rounds of re-estimating several unknown noise levels
+
+
+def descend(
+    problem: Problem,
+    start: Mapping[str, float] | None = None,
+    *,
+    method: str = "levenberg-marquardt",
+    max_steps: int = 200,
+    tolerance: float = 1e-9,
+    on_accept: Callable[[int, float, dict[str, float]], None] | None = None,
+) -> Descent:
+    """The bare minimisation from one start; `Descent.y` are the free parameters themselves, in the order of
+    `problem.free`.
+
+    Args:
+        problem: what to fit.
+        start: values for all parameters (the problem's own if None).
+        method: "levenberg-marquardt", "adam" or "lbfgs".
+        max_steps: evaluations at most.
+        tolerance: relative decrease of the misfit below which it stops.
+        on_accept: told evaluations, chi-square and values after every accepted step.
+    """
+    box = problem.box
+    y = box.free(problem.vector(start if start is not None else problem.start))
+
+    def report(n, cost, y):
+        on_accept(n, 2 * cost, problem.values(box.bounded(y)[0]))
+
+    heard = report if on_accept is not None else None
+    if method == "levenberg-marquardt":
+
+        def linearised(y):
+            x, slope = box.bounded(y)
+            r, jacobian = problem.linearised(problem.values(x))
+            r, bend = soften(problem.loss, r)
+            return r, jacobian * slope * bend[:, None]
+
+        found = levenberg_marquardt(linearised, y, max_steps=max_steps, tolerance=tolerance, on_accept=heard)
+    elif method in GRADIENT_METHODS:
+        found = gradient_descent(problem, y, method, max_steps=max_steps, tolerance=tolerance, on_accept=heard)
+    else:
+        raise InputError(f"unknown method {method!r}; one of {', '.join(METHODS)}")
+    trace = [(cost, box.bounded(y)[0]) for cost, y in found.trace]
+    return Descent(box.bounded(found.y)[0], found.cost, found.converged, found.reason, found.n_evaluations, trace)
+
+
+def fit(
+    problem: Problem,
+    *,
+    start: Mapping[str, float] | None = None,
+    multistart: int = 4,
+    method: str = "levenberg-marquardt",
+    holdout: "Predictor | None" = None,
+    seed: int = 0,
+    max_steps: int = 200,
+    on_accept: Callable[[int, float, dict[str, float]], None] | None = None,
+) -> Fit:
+    """Estimate the free parameters of a problem.
+
+    Args:
+        problem: predictor, free parameters, noise, bounds, priors.
+        start: values to begin with, taken as they are; None scales the problem's moduli to the data first.
+        multistart: number of starts (the first as given, the others seeded variations); the best end wins.
+        method: "levenberg-marquardt", "adam" or "lbfgs".
+        holdout: a predictor of the same model and sample for the recordings to predict and score only.
+        seed: of the further starts.
+        max_steps: evaluations for each start.
+        on_accept: told evaluations, chi-square and values after every accepted step.
+
+    Raises:
+        InputError: a start at which the model has no finite prediction, an unknown method or recording.
+        NotConverged: no start led to a finite misfit.
+    """
+    begun = time.perf_counter()
+    first = dict(problem.start) | dict(start or {}) if start is not None else scaled_to_data(problem)
+    tries = [first, *variations(problem, first, multistart - 1, seed)]
+    n, ends = 0, []
+    options = {"method": method, "max_steps": max_steps, "on_accept": on_accept}
+    for values in tries:
+        ends.append(descend(problem, values, **options))
+        n += ends[-1].n_evaluations
+    best = min(ends, key=lambda d: (d.cost, not d.converged))
+    if not np.isfinite(best.cost):
+        raise InputError(
+            "the model has no finite prediction at the start (a stretch outside the energy's valid range?): "
+            f"start was {_listed(problem, first)}; change it with --start, or the energy"
+        )
+    starts = [2 * d.cost for d in ends]
+    if problem.noise.estimated:
+        problem, best, more = _with_estimated_noise(problem, best, options)
+        n += more
+    values = problem.values(best.y)
+    spread = curvature(problem, values)
+    predictions = dict(problem.predictor.predict(values))
+    std = dict(problem.noise.std)
+    outside = holdout.names if holdout is not None else ()
+    if holdout is not None:
+        predictions |= holdout.predict(values)
+        std |= _holdout_noise(problem, outside)
+    measured = problem.predictor.sample.recordings
+    inside = {name: predictions[name] for name in problem.predictor.names}
+    bounds = {p: side for p, side in zip(problem.free, problem.box.at_bound(best.y), strict=True) if side}
+    found = Fit(
+        problem=problem,
+        status="converged" if best.converged else best.reason,
+        values=values,
+        uncertainty=spread,
+        at_bound=bounds,
+        chi2=2 * best.cost,
+        channels=scores(measured, inside, std),
+        holdout=scores(measured, {name: predictions[name] for name in outside}, std),
+        predictions=predictions,
+        trace=[Iterate(i, 2 * cost, problem.values(x)) for i, (cost, x) in enumerate(best.trace, start=1)],
+        starts=starts,
+        n_evaluations=n,
+        seconds=time.perf_counter() - begun,
+        method=method,
+    )
+    found.warnings.extend(warnings_of(found))
+    return found
+
+
+def required(found: Fit) -> Fit:
+    """`found` itself if it converged.
+
+    Raises:
+        NotConverged: with the reason and the advice.
+    """
+    if not found.converged:
+        raise NotConverged(
+            f"the fit did not converge ({found.status}); try other starts, more --max-steps or fewer parameters"
+        )
+    return found
+
+
+def curvature(problem: Problem, values: Mapping[str, float]) -> Uncertainty:
+    """Uncertainty of the free parameters at `values`, widened where the misfit exceeds the noise."""
+    r, jacobian = problem.linearised(values)
+    dof = max(1, len(r) - len(problem.free))
+    widening = max(1.0, float(np.sqrt(float(r @ r) / dof)))
+    declared = problem.predictor.model.parameters
+    return uncertainty(
+        jacobian,
+        problem.vector(values),
+        np.array([declared[path].typical for path in problem.free]),
+        tuple(path.removeprefix("energy.") for path in problem.free),
+        tuple(declared[path].unit for path in problem.free),
+        widening,
+    )
+
+
+def _with_estimated_noise(problem: Problem, best: Descent, options) -> tuple[Problem, Descent, int]:
+    """Replace guessed noise by the residuals' own; refit where several levels are unknown, since their ratio
+    matters.
+    """
+    n = 0
+    several = len(set(problem.noise.groups.values())) > 1 or len(problem.noise.groups) < len(problem.noise.std)
+    for _ in range(AGAIN if several else 1):
+        r = problem.residuals(problem.values(best.y))
+        factors = {}
+        for group in set(problem.noise.groups.values()):
+            mine = np.concatenate(
+                [r[rows] for key, rows in problem.rows.items() if problem.noise.groups.get("/".join(key)) == group]
+            )
+            taken = len(problem.free) * len(mine) / problem.n_samples
+            factors[group] = max(float(np.sqrt(mine @ mine / max(1.0, len(mine) - taken))), 1e-9)
+        problem = problem.with_noise(problem.noise.scaled(factors))
+        if several or problem.priors or problem.loss != "squares":
+            again = descend(problem, problem.values(best.y), **options)
+            n += again.n_evaluations
+            best = again if np.isfinite(again.cost) else best
+        else:
+            factor = next(iter(factors.values())) ** 2
+            best = Descent(
+                best.y,
+                best.cost / factor,
+                best.converged,
+                best.reason,
+                best.n_evaluations,
+                [(cost / factor, x) for cost, x in best.trace],
+            )
+    return problem, best, n
+
+
+def _holdout_noise(problem: Problem, names: tuple[str, ...]) -> dict[str, float]:
+    """Noise of held-out channels: their own if recorded, else that of a fitted channel of the same name."""
+    found = {}
+    fitted = {key.split("/")[-1]: s for key, s in problem.noise.std.items()}
+    for name in names:
+        for channel, series in problem.predictor.sample.recordings[name].channels.items():
+            recorded = series.noise_std
+            found[f"{name}/{channel}"] = float(recorded) if recorded else fitted.get(channel, 1.0)
+    return found
+
+
+def _listed(problem: Problem, values: Mapping[str, float]) -> str:
+    return ", ".join(f"{path} = {values[path]:g}" for path in problem.free)

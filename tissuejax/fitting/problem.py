@@ -1,0 +1,174 @@
+"""A fitting problem: a predictor, which parameters are free, and what a misfit of one unit means.
+
+Residuals are (predicted - measured) / sigma over all samples of all channels, lost (NaN) samples left out, followed
+by one row for every prior, (value - mean) / std. The Jacobian comes from the predictor's own forward mode.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Float
+
+from tissuejax.errors import InputError, unknown
+from tissuejax.fitting.losses import checked_loss
+from tissuejax.fitting.transforms import Box, checked_bounds
+from tissuejax.fitting.weights import Noise
+
+if TYPE_CHECKING:
+    from tissuejax.experiments.predictor import Predictor
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is to be fitted.
+
+    Attributes:
+        predictor: from values to recordings; its `names` are the recordings that take part.
+        free: dotted paths of the parameters to estimate.
+        start: a value for every parameter of the model, free or not, SI.
+        noise: the standard deviation of each channel.
+        bounds: (lower, upper) by path where they differ from the declared range.
+        priors: (mean, standard deviation) by path.
+        loss: "squares", "soft-l1" or "cauchy".
+    """
+
+    predictor: "Predictor"
+    free: tuple[str, ...]
+    start: Mapping[str, float]
+    noise: Noise
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    loss: str = "squares"
+
+    def __post_init__(self):
+        declared = self.predictor.model.parameters
+        for kind, paths in (("free parameter", self.free), ("bound", self.bounds), ("prior", self.priors)):
+            for path in paths:
+                if path not in declared:
+                    raise unknown(kind, path, declared)
+        for path in self.start:
+            if path not in declared:
+                raise unknown("parameter", path, declared)
+        missing = sorted(set(declared) - set(self.start))
+        if missing:
+            raise InputError(f"no start value for {', '.join(missing)}; give one, or leave start out for the defaults")
+        if not self.free:
+            raise InputError("no parameter is free: name at least one to estimate")
+        if len(set(self.free)) < len(self.free):
+            raise InputError(f"a free parameter is listed twice: {', '.join(self.free)}")
+        checked_loss(self.loss)
+        for path in self.free:
+            lower, upper = self.bound(path)
+            value = float(self.start[path])
+            if not math.isfinite(value) or not lower <= value <= upper:
+                unit = declared[path].unit
+                raise InputError(
+                    f"start of {path} = {value} {unit}: allowed is {lower} to {upper} {unit}; move the start"
+                )
+        for path, (_, std) in self.priors.items():
+            if not std > 0:
+                raise InputError(f"prior of {path}: standard deviation {std}; it must be positive")
+        if self.n_samples < len(self.free):
+            raise InputError(
+                f"{self.n_samples} samples can't determine {len(self.free)} parameters ({', '.join(self.free)}): "
+                "fix some with --fix, take a smaller energy or more recordings"
+            )
+
+    def bound(self, path: str) -> tuple[float, float]:
+        """(lower, upper) of a free parameter; given bounds are cut to the declared range."""
+        declared = self.predictor.model.parameters[path]
+        lower, upper = self.bounds.get(path, (declared.lower, declared.upper))
+        return checked_bounds(path, max(lower, declared.lower), min(upper, declared.upper))
+
+    @cached_property
+    def box(self) -> Box:
+        """The transform of the free parameters."""
+        lower, upper = zip(*(self.bound(path) for path in self.free), strict=True)
+        return Box(list(lower), list(upper), [self.scale(path) for path in self.free])
+
+    def scale(self, path: str) -> float:
+        """Typical magnitude of a parameter, from its start or its declaration."""
+        start = abs(float(self.start[path]))
+        declared = self.predictor.model.parameters[path]
+        return start if start > 1e-3 * declared.typical else declared.typical
+
+    @cached_property
+    def channels(self) -> tuple[tuple[str, str], ...]:
+        """(recording, channel) in the order of the residuals."""
+        recordings = self.predictor.sample.recordings
+        return tuple(
+            (name, channel)
+            for name in self.predictor.names
+            for channel in recordings[name].channels
+            if f"{name}/{channel}" in self.noise.std
+        )
+
+    @cached_property
+    def measured(self) -> dict[tuple[str, str], Float[np.ndarray, " n"]]:
+        """Measured values of each channel, flat."""
+        recordings = self.predictor.sample.recordings
+        return {(r, c): np.asarray(recordings[r].channels[c].values, float).ravel() for r, c in self.channels}
+
+    @cached_property
+    def seen(self) -> dict[tuple[str, str], np.ndarray]:
+        """Indices of the samples that were not lost."""
+        return {key: np.flatnonzero(np.isfinite(values)) for key, values in self.measured.items()}
+
+    @cached_property
+    def rows(self) -> dict[tuple[str, str], slice]:
+        """Where each channel lies in the residuals."""
+        found, first = {}, 0
+        for key in self.channels:
+            found[key] = slice(first, first + len(self.seen[key]))
+            first = found[key].stop
+        return found
+
+    @property
+    def n_samples(self) -> int:
+        """Number of measured values that take part."""
+        return sum(len(kept) for kept in self.seen.values())
+
+    def sigma(self, key: tuple[str, str]) -> float:
+        """Standard deviation of one channel, SI."""
+        return self.noise.std["/".join(key)]
+
+    def values(self, x: Float[np.ndarray, " p"]) -> dict[str, float]:
+        """A full value set with the free parameters at `x`."""
+        return {path: float(v) for path, v in self.start.items()} | dict(zip(self.free, map(float, x), strict=True))
+
+    def vector(self, values: Mapping[str, float]) -> Float[np.ndarray, " p"]:
+        """The free parameters of a value set."""
+        return np.array([float(values[path]) for path in self.free])
+
+    def residuals(self, values: Mapping[str, float]) -> Float[np.ndarray, " n"]:
+        """(predicted - measured) / sigma, then the priors; one forward run of the model."""
+        return self._stack(self.predictor.predict(dict(values)), values)
+
+    def linearised(self, values: Mapping[str, float]) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n p"]]:
+        """Residuals and their Jacobian to the free parameters; one forward-mode run."""
+        predicted, slopes = self.predictor.jacobian(dict(values), self.free)
+        jacobian = np.empty((self.n_samples + len(self.priors), len(self.free)))
+        for column, path in enumerate(self.free):
+            for key, rows in self.rows.items():
+                slope = np.asarray(slopes[path][key[0]][key[1]], float).ravel()[self.seen[key]]
+                jacobian[rows, column] = slope / self.sigma(key)
+            for row, (prior, (_, std)) in enumerate(self.priors.items(), start=self.n_samples):
+                jacobian[row, column] = (prior == path) / std
+        return self._stack(predicted, values), jacobian
+
+    def _stack(self, predicted, values) -> Float[np.ndarray, " n"]:
+        parts = []
+        for (recording, channel), kept in self.seen.items():
+            value = np.asarray(predicted[recording].channels[channel].values, float).ravel()[kept]
+            measured = self.measured[recording, channel][kept]
+            parts.append((value - measured) / self.sigma((recording, channel)))
+        parts.append(np.array([(float(values[p]) - mean) / std for p, (mean, std) in self.priors.items()]))
+        return np.concatenate(parts)
+
+    def with_noise(self, noise: Noise) -> "Problem":
+        """The same problem with other standard deviations."""
+        return replace(self, noise=noise)

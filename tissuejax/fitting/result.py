@@ -1,0 +1,154 @@
+"""What a fit found: values, uncertainties, errors per channel, warnings in sentences; and its record as JSON."""
+
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import metadata
+
+import jax
+import numpy as np
+
+from tissuejax.fitting.problem import Problem
+from tissuejax.fitting.scores import Score
+from tissuejax.fitting.uncertainty import Uncertainty
+from tissuejax.recordings.recording import Recording
+
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Iterate:
+    """One accepted point of the descent: evaluations so far, chi-square, free values."""
+
+    n_evaluations: int
+    chi2: float
+    values: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The outcome of `fit`.
+
+    Attributes:
+        problem: what was solved (with the noise finally used).
+        status: "converged" or the reason why not.
+        values: all parameters, SI; the free ones at their estimates.
+        uncertainty: standard errors, covariance, correlation, condition, sentences.
+        at_bound: "lower" or "upper" for a free parameter that ran into a bound.
+        chi2: sum of squared residuals in units of the noise.
+        channels: score by "recording/channel".
+        holdout: the same for recordings that took no part.
+        predictions: predicted recordings, fitted and held out.
+        trace: accepted points of the best start.
+        starts: final chi-square of every start, in the order tried (NaN for one that failed).
+        n_evaluations: runs of the model with derivatives, all starts together.
+        seconds: wall time, compilation included.
+        warnings: sentences for the reader.
+        method: how it was minimised.
+    """
+
+    problem: Problem
+    status: str
+    values: dict[str, float]
+    uncertainty: Uncertainty
+    at_bound: dict[str, str]
+    chi2: float
+    channels: dict[str, Score]
+    holdout: dict[str, Score]
+    predictions: Mapping[str, Recording]
+    trace: list[Iterate]
+    starts: list[float]
+    n_evaluations: int
+    seconds: float
+    warnings: list[str] = field(default_factory=list)
+    method: str = "levenberg-marquardt"
+
+    @property
+    def converged(self) -> bool:
+        """Whether the minimisation ended by its tolerance."""
+        return self.status == "converged"
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Paths of the estimated parameters."""
+        return self.problem.free
+
+    @property
+    def std(self) -> dict[str, float]:
+        """Standard errors by path."""
+        return dict(zip(self.free, map(float, self.uncertainty.std), strict=True))
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(p, p), order of `free`."""
+        return self.uncertainty.covariance
+
+    @property
+    def correlation(self) -> np.ndarray:
+        """(p, p), order of `free`."""
+        return self.uncertainty.correlation
+
+    @property
+    def chi2_per_dof(self) -> float:
+        """Chi-square per degree of freedom."""
+        return self.chi2 / max(1, self.problem.n_samples + len(self.problem.priors) - len(self.free))
+
+    def record(self) -> dict:
+        """The contents of result.json."""
+        model = self.problem.predictor.model
+        declared = model.parameters
+        return {
+            "format": FORMAT,
+            "status": self.status,
+            "sample": self.problem.predictor.sample.name,
+            "energy": described(model),
+            "effects": [effect.name for effect in model.effects],
+            "method": self.method,
+            "recordings": list(self.problem.predictor.names),
+            "parameters": {
+                path: {
+                    "value": float(value),
+                    "std": self.std.get(path),
+                    "unit": declared[path].unit,
+                    "at_bound": self.at_bound.get(path),
+                    "free": path in self.free,
+                }
+                for path, value in self.values.items()
+            },
+            "correlation": {"paths": list(self.free), "matrix": self.correlation.tolist()},
+            "condition_number": self.uncertainty.condition,
+            "not_identified": list(self.uncertainty.sentences),
+            "chi2": self.chi2,
+            "chi2_per_dof": self.chi2_per_dof,
+            "noise": {
+                key: {"std": s, "estimated": key in self.problem.noise.groups}
+                for key, s in self.problem.noise.std.items()
+            },
+            "channels": {key: s.record() for key, s in self.channels.items()},
+            "holdout": {key: s.record() for key, s in self.holdout.items()},
+            "warnings": list(self.warnings),
+            "starts": self.starts,
+            "n_evaluations": self.n_evaluations,
+            "seconds": self.seconds,
+            "trace": [{"n_evaluations": i.n_evaluations, "chi2": i.chi2, "values": i.values} for i in self.trace],
+            "versions": versions(),
+        }
+
+
+def described(model) -> dict:
+    """The energy's name and the named forms that its numbers depend on."""
+    forms = {f: str(v) for f, v in vars(model.energy).items() if isinstance(v, str | int) and not f.startswith("_")}
+    forms["volumetric"] = model.volumetric.name if model.volumetric is not None else "incompressible"
+    return {"name": model.energy.name, "formula": model.energy.formula, "forms": forms, "source": model.energy.source}
+
+
+def versions() -> dict[str, str]:
+    """Versions that a number may depend on."""
+    names = ("tissuejax", "jax", "optimistix", "optax", "diffrax", "numpy", "scipy")
+    found = {"python": platform.python_version(), "float": str(jax.dtypes.canonicalize_dtype(float))}
+    for name in names:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "not installed"
+    return found

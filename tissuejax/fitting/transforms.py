@@ -1,0 +1,94 @@
+"""Bounds by change of variable, so that a solver without bounds never leaves the valid range.
+
+With a scale s (the typical magnitude of the parameter) the free variable y gives
+
+    no bound      x = s y
+    lower only    x = lower + s softplus(y)
+    upper only    x = upper - s softplus(-y)
+    both          x = lower + (upper - lower) sigmoid(y)
+
+Far from a bound these are linear in y, near it exponential. Numpy, not JAX: a solver needs x and dx/dy between two
+evaluations of the model, never inside one.
+"""
+
+import math
+
+import numpy as np
+from jaxtyping import Float
+
+from tissuejax.errors import InputError
+
+NUDGE = 1e-3  # a start at a bound is moved inside by this share of the scale (or of the width)
+AT_BOUND = 2e-3  # an estimate this near to a bound, as a share of scale or width, is reported as being at it
+
+
+def checked_bounds(path: str, lower: float, upper: float) -> tuple[float, float]:
+    """The pair itself, if it is one.
+
+    Raises:
+        InputError: not a number, or lower >= upper.
+    """
+    if math.isnan(lower) or math.isnan(upper) or not lower < upper:
+        raise InputError(f"bounds of {path}: ({lower}, {upper}); lower must be below upper, swap or widen them")
+    return float(lower), float(upper)
+
+
+def width(lower: float, upper: float, scale: float) -> float:
+    """The length by which nearness to a bound is measured."""
+    return min(upper - lower, scale) if math.isfinite(upper - lower) else scale
+
+
+class Box:
+    """The transform of a vector of parameters with given bounds and scales."""
+
+    def __init__(self, lower: list[float], upper: list[float], scale: list[float]):
+        self.lower, self.upper = np.asarray(lower, float), np.asarray(upper, float)
+        self.scale = np.asarray(scale, float)
+        low, high = np.isfinite(self.lower), np.isfinite(self.upper)
+        self.both, self.only_lower, self.only_upper = low & high, low & ~high, high & ~low
+        self.span = np.where(self.both, self.upper - self.lower, self.scale)
+        self.span = np.where(np.isfinite(self.span), self.span, self.scale)
+
+    def inward(self, x: Float[np.ndarray, " p"]) -> Float[np.ndarray, " p"]:
+        """`x` moved off (or back inside) its bounds."""
+        step = NUDGE * np.minimum(self.span, self.scale)
+        return np.clip(x, self.lower + step, self.upper - step)
+
+    def free(self, x: Float[np.ndarray, " p"]) -> Float[np.ndarray, " p"]:
+        """y of an x strictly inside."""
+        x = self.inward(np.asarray(x, float))
+        y = x / self.scale
+        with np.errstate(all="ignore"):
+            y = np.where(self.only_lower, _inverse_softplus((x - self.lower) / self.scale), y)
+            y = np.where(self.only_upper, -_inverse_softplus((self.upper - x) / self.scale), y)
+            share = (x - self.lower) / self.span
+            return np.where(self.both, np.log(share) - np.log1p(-share), y)
+
+    def bounded(self, y: Float[np.ndarray, " p"]) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
+        """x and dx/dy."""
+        x, slope = self.scale * y, self.scale.copy()
+        grow, fall = _sigmoid(y), _sigmoid(-y)
+        with np.errstate(all="ignore"):
+            x = np.where(self.only_lower, self.lower + self.scale * np.logaddexp(0, y), x)
+            x = np.where(self.only_upper, self.upper - self.scale * np.logaddexp(0, -y), x)
+            x = np.where(self.both, self.lower + self.span * grow, x)
+            slope = np.where(self.only_lower, self.scale * grow, slope)
+            slope = np.where(self.only_upper, self.scale * fall, slope)
+            slope = np.where(self.both, self.span * grow * fall, slope)
+        return x, slope
+
+    def at_bound(self, x: Float[np.ndarray, " p"]) -> list[str | None]:
+        """For each parameter "lower", "upper" or None."""
+        near = AT_BOUND * np.minimum(self.span, np.maximum(self.scale, np.abs(x)))
+        return [
+            "lower" if xi - lo < n else "upper" if hi - xi < n else None
+            for xi, lo, hi, n in zip(x, self.lower, self.upper, near, strict=True)
+        ]
+
+
+def _sigmoid(y):
+    return 0.5 * (1 + np.tanh(0.5 * y))
+
+
+def _inverse_softplus(z):
+    return np.where(z > 30, z, np.log(np.expm1(np.minimum(z, 30))))

@@ -1,0 +1,114 @@
+"""How well the data determine the parameters: covariance, correlation, condition, and in words what is not seen.
+
+At the optimum the covariance is (J'J)^-1 in noise units. A misfit larger than the noise (chi-square per degree of
+freedom above one) widens it by that factor, since then the residuals are the better measure of what a sample is worth.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+UNSEEN = 1.0  # a combination whose relative standard error exceeds this is called not identified
+SHARE = 0.3  # a parameter takes part in a combination from this share of its largest member on
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Second-order picture of the misfit around the optimum.
+
+    Attributes:
+        std: standard errors, in the parameters' units; infinite where nothing is seen.
+        covariance: (p, p).
+        correlation: (p, p).
+        condition: condition number of the Jacobian with relative parameters as columns.
+        sentences: what the data do not tell apart.
+    """
+
+    std: Float[np.ndarray, " p"]
+    covariance: Float[np.ndarray, "p p"]
+    correlation: Float[np.ndarray, "p p"]
+    condition: float
+    sentences: tuple[str, ...]
+
+
+def uncertainty(
+    jacobian: Float[np.ndarray, "n p"],
+    x: Float[np.ndarray, " p"],
+    scale: Float[np.ndarray, " p"],
+    labels: tuple[str, ...],
+    units: tuple[str, ...],
+    widening: float = 1.0,
+) -> Uncertainty:
+    """Uncertainty from the Jacobian of the residuals (in units of the noise) at the optimum.
+
+    Args:
+        jacobian: residuals to parameters.
+        x: the optimum.
+        scale: typical magnitudes, used where a parameter is near zero.
+        labels: names for the sentences.
+        units: their units; a combination of equal units is written as a sum, of different ones as a product.
+        widening: factor on the standard errors (square root of the chi-square per degree of freedom, if above one).
+    """
+    size = np.maximum(np.abs(x), 1e-3 * scale)
+    _, s, vt = np.linalg.svd(jacobian * size, full_matrices=False)
+    top = s[0] if len(s) and s[0] > 0 else 1.0
+    floor = 1e-13 * top
+    inverse = 1 / np.maximum(s, floor)
+    relative = (vt.T * inverse**2) @ vt * widening**2
+    covariance = relative * np.outer(size, size)
+    std = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(std, std)
+    lost = s <= 1e-10 * top
+    if lost.any():  # the direction is flat to rounding: no number for those who take part
+        flat = (np.abs(vt[lost]) > 0.01).any(axis=0)
+        std = np.where(flat, np.inf, std)
+    condition = float(top / s[-1]) if s[-1] > floor else float("inf")
+    sentences = tuple(
+        unseen(v, size, labels, units, widening / max(value, floor))
+        for value, v in zip(s, vt, strict=True)
+        if widening / max(value, floor) > UNSEEN
+    )
+    return Uncertainty(std, covariance, correlation, condition, sentences)
+
+
+def unseen(
+    direction: Float[np.ndarray, " p"], size: Float[np.ndarray, " p"], labels, units, relative_std: float
+) -> str:
+    """A plain sentence on one direction (in relative parameters) that the data leave open."""
+    who = [i for i in np.argsort(-np.abs(direction)) if abs(direction[i]) > SHARE * np.abs(direction).max()]
+    amount = (
+        "hardly changes the prediction" if relative_std > 10 else f"is only known to within {100 * relative_std:.0f} %"
+    )
+    if len(who) == 1:
+        return f"{labels[who[0]]} is not identified by these recordings: changing it {amount}."
+    if len(who) == 2:
+        i, j = sorted(who)
+        return (
+            f"only {seen_pair(direction, size, labels, units, i, j)} is seen: moving along it one against "
+            f"the other {amount}."
+        )
+    moves = ", ".join(f"{labels[i]} by {100 * direction[i] / np.abs(direction).max():+.0f} %" for i in sorted(who))
+    return f"one combination is not identified: changing {moves} together {amount}."
+
+
+def seen_pair(direction, size, labels, units, i: int, j: int) -> str:
+    """The combination of two parameters orthogonal to a flat direction: mu1 + 0.52 mu3, or c * alpha^0.9."""
+    if units[i] == units[j] and units[i] != "1":
+        weight = -direction[i] * size[i] / (direction[j] * size[j])
+        sign, weight = ("+" if weight > 0 else "-"), abs(weight)
+        factor = "" if abs(weight - 1) < 0.05 else f"{weight:.2g} "
+        return f"{labels[i]} {sign} {factor}{labels[j]}"
+    power = -direction[i] / direction[j]
+    if abs(power - 1) < 0.05:
+        return f"{labels[i]} * {labels[j]}"
+    return f"{labels[i]} * {labels[j]}^{power:.2g}"
+
+
+def autocorrelation(r: Float[np.ndarray, " n"]) -> float:
+    """Lag-one correlation of a residual series, 0 for fewer than 8 samples."""
+    if len(r) < 8:
+        return 0.0
+    r = r - r.mean()
+    total = float(r @ r)
+    return float(r[1:] @ r[:-1]) / total if total > 0 else 0.0
