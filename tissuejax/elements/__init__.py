@@ -1,1 +1,1 @@
-"""Room: elements."""
+"""Finite elements, one a file, found by walking this folder."""

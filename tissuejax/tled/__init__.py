@@ -1,1 +1,1 @@
-"""Room: tled."""
+"""The explicit total Lagrangian simulator: step, contact, statics, saving."""

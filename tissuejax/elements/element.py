@@ -1,0 +1,90 @@
+"""What every element is: where its nodes lie, its shape functions, its faces, and how it turns displacement into force.
+
+An element keeps what depends on the reference shape alone (`reference`) and offers the two linear maps that the
+total Lagrangian step needs: `gradient` from nodal displacements to F, and `forces` back from first
+Piola-Kirchhoff stress to nodal forces (its transpose, times the volume). Components come first and the element
+axis last, so that XLA vectorises over elements. Total Lagrangian dynamics: Lister 2012, 4.3.1; Miller et al. 2007.
+"""
+
+import abc
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+Tensor9 = tuple[Float[Array, " E"], ...]  # a 3x3 tensor by rows: xx xy xz yx yy yz zx zy zz
+
+
+class Element(eqx.Module):
+    """A solid element with one stress point.
+
+    Class data:
+        name: as meshio calls the cell type.
+        corners: reference coordinates of the nodes.
+        faces: local nodes of each face, normal outward.
+        averaged_pressure: True where the volumetric energy is taken at the nodes.
+    """
+
+    name: ClassVar[str]
+    corners: ClassVar[np.ndarray]
+    faces: ClassVar[tuple[tuple[int, ...], ...]]
+    averaged_pressure: ClassVar[bool] = False
+
+    @property
+    def nodes(self) -> int:
+        """Nodes of one element."""
+        return len(self.corners)
+
+    @abc.abstractmethod
+    def shape(self, xi: Float[Array, "q 3"]) -> Float[Array, "q k"]:
+        """Shape functions at reference points: 1 at their own node, 0 at the others, sum 1."""
+
+    @abc.abstractmethod
+    def reference(self, x: Float[Array, "3 k E"]) -> Any:
+        """What depends on the reference node positions alone; the volume is its attribute `volume` (E,), m^3."""
+
+    @abc.abstractmethod
+    def gradient(self, reference: Any, u: Float[Array, "3 k E"]) -> tuple[Tensor9, Any]:
+        """Deformation gradient F at the stress point, and what the element remembers for its hourglass force."""
+
+    @abc.abstractmethod
+    def forces(self, reference: Any, P: Tensor9, memory: Any, stiffness: Float[Array, " E"]) -> Float[Array, "3 k E"]:
+        """Nodal forces of the first Piola-Kirchhoff stress P (Pa) and of hourglass stiffness (Pa)."""
+
+    @abc.abstractmethod
+    def steepness(self, reference: Any) -> Float[Array, " E"]:
+        """Largest eigenvalue of sum_a B_a B_a^T times the number of nodes, 1/m^2.
+
+        With wave speed c the highest frequency of an element obeys omega^2 <= c^2 * steepness.
+        """
+
+
+def determinant(F: Tensor9) -> Float[Array, " E"]:
+    """J = det F."""
+    a, b, c, d, e, f, g, h, i = F
+    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+
+
+def cofactor(F: Tensor9) -> Tensor9:
+    """cof F = J F^-T, the derivative of det F."""
+    a, b, c, d, e, f, g, h, i = F
+    return (
+        e * i - f * h, f * g - d * i, d * h - e * g,
+        c * h - b * i, a * i - c * g, b * g - a * h,
+        b * f - c * e, c * d - a * f, a * e - b * d,
+    )  # fmt: skip
+
+
+def inverse(F: Tensor9) -> Tensor9:
+    """F^-1 = cof(F)^T / det F."""
+    J = determinant(F)
+    a, b, c, d, e, f, g, h, i = cofactor(F)
+    return tuple(x / J for x in (a, d, g, b, e, h, c, f, i))
+
+
+def largest_eigenvalue(xx, yy, zz, xy, xz, yz) -> Float[Array, " E"]:
+    """Largest eigenvalue of symmetric 3x3 matrices by components."""
+    rows = [jnp.stack(r, -1) for r in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))]
+    return jnp.linalg.eigvalsh(jnp.stack(rows, -2))[..., -1]

@@ -1,0 +1,45 @@
+"""Materials with a memory: Prony relaxation of the isochoric stress, and softening by the greatest energy so far.
+
+Both are written so that the neutral value changes nothing to the last bit: S = S0 - sum_i g_i q_i with
+dq_i/dt = (S0 - q_i)/tau_i, which is the usual hereditary integral with the instantaneous stress S0 (Lister 2012 has
+none; Holzapfel 2000, 6.10; Simo 1987), and S = (1 - d) S0 with d = amount (1 - exp(-max psi / scale)) (Simo 1987).
+"""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+
+class Prony(eqx.Module):
+    """Relative moduli g_i (their sum below 1) and relaxation times tau_i in s of the isochoric stress."""
+
+    g: Float[Array, " m"]
+    tau: Float[Array, " m"]
+
+
+class Damage(eqx.Module):
+    """Softening: the isochoric stress loses up to `amount` (below 1) as the greatest energy passes `scale`, Pa."""
+
+    amount: Float[Array, ""]
+    scale: Float[Array, ""]
+
+    def factor(self, greatest: Float[Array, " E"]) -> Float[Array, " E"]:
+        """1 - d."""
+        return 1.0 - self.amount * (1.0 - jnp.exp(-greatest / self.scale))
+
+
+def relax(prony: Prony, q: list, S0: tuple, step: Float[Array, ""]) -> tuple[list, tuple]:
+    """One step of every Prony term: q <- q + (1 - exp(-h/tau)) (S0 - q), S = S0 - sum_i g_i q_i.
+
+    Args:
+        q: for each term, six arrays (E,), the part of the stress that has relaxed.
+        S0: instantaneous isochoric stress, six arrays.
+        step: h, on the clock on which `tau` is given.
+    """
+    S, new = list(S0), []
+    for i, term in enumerate(q):
+        share = -jnp.expm1(-step / prony.tau[i])
+        term = tuple(old + share * (s - old) for old, s in zip(term, S0, strict=True))
+        S = [s - prony.g[i] * t for s, t in zip(S, term, strict=True)]
+        new.append(term)
+    return new, tuple(S)

@@ -1,0 +1,72 @@
+"""Shapes of rigid probes, each by its signed distance (positive outside), from which follows the direction of push."""
+
+import abc
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+Vector = tuple[Float[Array, "..."], Float[Array, "..."], Float[Array, "..."]]
+
+
+def _length(*parts):
+    """Euclidean length whose derivative at zero is zero instead of NaN."""
+    square = sum(p * p for p in parts)
+    safe = jnp.where(square > 0, square, 1.0)
+    return jnp.where(square > 0, jnp.sqrt(safe), 0.0)
+
+
+class Shape(eqx.Module):
+    """A rigid shape about its reference point."""
+
+    name: ClassVar[str]
+
+    @abc.abstractmethod
+    def distance(self, x: Vector) -> tuple[Float[Array, "..."], Vector]:
+        """Signed distance of points x (relative to the reference point), m, and its gradient (outward normal)."""
+
+    def reach(self) -> Float[Array, ""] | float:
+        """Radius, across the probe's axis, within which it may touch; m."""
+        return float("inf")
+
+
+class Sphere(Shape):
+    """A ball: |x| - R."""
+
+    name: ClassVar[str] = "sphere"
+    radius: Float[Array, ""] | float
+
+    def distance(self, x: Vector) -> tuple[Array, Vector]:
+        r = _length(*x)
+        safe = jnp.where(r > 0, r, 1.0)
+        return r - self.radius, tuple(p / safe for p in x)
+
+    def reach(self) -> Any:
+        return self.radius
+
+
+class Hemisphere(Shape):
+    """A half ball that points down (-z) under a cylindrical shank of the same radius: distance to an upward capsule."""
+
+    name: ClassVar[str] = "hemisphere"
+    radius: Float[Array, ""] | float
+
+    def distance(self, x: Vector) -> tuple[Array, Vector]:
+        below = jnp.minimum(x[2], 0.0)
+        r = _length(x[0], x[1], below)
+        safe = jnp.where(r > 0, r, 1.0)
+        return r - self.radius, (x[0] / safe, x[1] / safe, below / safe)
+
+    def reach(self) -> Any:
+        return self.radius
+
+
+class Platen(Shape):
+    """A flat platen that fills the half space above its reference point: -z; it pushes down."""
+
+    name: ClassVar[str] = "platen"
+
+    def distance(self, x: Vector) -> tuple[Array, Vector]:
+        zero = jnp.zeros_like(x[2])
+        return -x[2], (zero, zero, zero - 1.0)
