@@ -1,0 +1,61 @@
+"""The sparing Levenberg-Marquardt: the least-squares answer with few Jacobians, and rejected steps cost a forward run."""
+
+import numpy as np
+import pytest
+
+from tissuejax.errors import UnstableSimulation
+from tissuejax.fitting.sparing import sparing
+
+T = np.linspace(0, 3, 200)
+TRUTH = np.log([2.0, 1.3])
+
+
+def model(y):
+    a, b = np.exp(y)
+    return a * np.exp(-b * T)
+
+
+def jacobian(y):
+    a, b = np.exp(y)
+    return np.stack([model(y), -b * T * model(y)], 1)
+
+
+@pytest.mark.parametrize("start", [(4.0, 0.5), (0.3, 6.0)])
+def test_finds_the_answer_with_few_jacobians(rng, start):
+    data = model(TRUTH) + rng.normal(0, 0.01, T.size)
+    calls = {"jacobian": 0, "forward": 0}
+
+    def residuals(y):
+        calls["forward"] += 1
+        return (model(y) - data) / 0.01
+
+    def linearised(y):
+        calls["jacobian"] += 1
+        return (model(y) - data) / 0.01, jacobian(y) / 0.01
+
+    out = sparing(linearised, residuals, np.log(start))
+    J = jacobian(TRUTH) / 0.01
+    std = np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
+    assert out.converged
+    assert (np.abs(out.y - TRUTH) < 4 * std).all()
+    assert calls["jacobian"] <= 8
+    assert out.n_evaluations == calls["jacobian"] + calls["forward"]
+
+
+def test_unstable_trials_are_rejected_not_masked(rng):
+    data = model(TRUTH) + rng.normal(0, 0.01, T.size)
+
+    def residuals(y):
+        if y[1] > np.log(1.6):
+            raise UnstableSimulation("blew up")
+        return (model(y) - data) / 0.01
+
+    out = sparing(lambda y: (residuals(y), jacobian(y) / 0.01), residuals, np.log([4.0, 0.4]))
+    assert out.converged
+    assert np.abs(out.y - TRUTH).max() < 0.05
+
+
+def test_a_start_without_prediction_says_so():
+    out = sparing(lambda y: (np.full(3, np.nan), np.ones((3, 1))), lambda y: np.zeros(3), np.zeros(1))
+    assert not out.converged
+    assert "no finite prediction" in out.reason
