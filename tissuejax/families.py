@@ -24,6 +24,8 @@ def members(package: ModuleType, kind: type) -> dict[str, type]:
         for _, member in inspect.getmembers(module, inspect.isclass):
             if member.__module__ != module.__name__ or not issubclass(member, kind) or inspect.isabstract(member):
                 continue
+            if not hasattr(member, "name"):  # shared by some members, itself none
+                continue
             if member.name in found:
                 raise RuntimeError(f"two members named {member.name!r}: {found[member.name]} and {member}")
             found[member.name] = member

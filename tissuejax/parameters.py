@@ -27,6 +27,7 @@ class Parameter:
         meaning: one phrase, for tables and help.
         scale: typical magnitude, for steps and transforms (defaults to |default| or 1).
         frozen: True for a value that a fit leaves alone unless it is named.
+        each: True for a value of its own in every recording (an offset, a phase): its path ends in the recording.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Parameter:
     meaning: str = ""
     scale: float | None = None
     frozen: bool = False
+    each: bool = False
 
     def __post_init__(self):
         if not self.lower < self.upper:

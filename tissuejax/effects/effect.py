@@ -5,14 +5,17 @@ At its neutral value an effect reproduces the Model without it to the last bit, 
 """
 
 import abc
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 import equinox as eqx
 from jaxtyping import Array, Float
 
+from tissuejax.effects.material_test import MaterialTest, Stress
 from tissuejax.energies.strain import Strain
 from tissuejax.parameters import Parameter
+
+Respond = Callable[[Array], Array]
 
 
 class Effect(eqx.Module):
@@ -25,11 +28,15 @@ class Effect(eqx.Module):
         blind: experiments (or protocols) that can't show it.
         amplitudes: parameters that are 0 at neutral; the others ("shapes") vanish with the effect.
         grid: for each shape parameter, the values that a diagnosis scans.
+        order: place among the effects of a model, whatever the order in which they were added; rig 0, tissue 1,
+            damage of tissue before its relaxation (2).
+        isotropic: False if the strain energy depends on direction.
 
     Hooks, in the order in which a material test applies them; each is the identity unless overridden:
-        `stretch` (rig: what the specimen really saw), `energy` (added strain energy), `memory` (isochoric stress with
-        history), `stress` (rig and sensor: what the cell reports). Probing: `scene` (the physical set-up: probe
-        path, support, stiffness field, contact law, memory...), `channels` (sensors).
+        `stretch` (rig: what the specimen really saw), `energy` (added strain energy), `volume` (volume ratio from mean
+        stress), `memory` (isochoric stress with history), `stress` (rig and sensor: what the cell reports). Probing:
+        `scene` (the physical set-up: probe path, support, stiffness field, contact law, memory...), `channels`
+        (sensors).
     """
 
     name: ClassVar[str]
@@ -39,6 +46,8 @@ class Effect(eqx.Module):
     source: ClassVar[str]
     amplitudes: ClassVar[tuple[str, ...]]
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {}
+    order: ClassVar[int] = 1
+    isotropic: ClassVar[bool] = True
 
     @property
     @abc.abstractmethod
@@ -50,19 +59,29 @@ class Effect(eqx.Module):
         """The values at which the effect is exactly off."""
         return {d.name: 0.0 if d.name in self.amplitudes else d.default for d in self.parameters}
 
-    def stretch(self, p: Mapping[str, Array], test: Any, stretch: Float[Array, "n ..."]) -> Float[Array, "n ..."]:
-        """Kinematic variable the specimen saw, from the one that was recorded."""
-        return stretch
+    def stretch(
+        self, p: Mapping[str, Array], test: MaterialTest, drive: Float[Array, "n ..."], respond: Respond
+    ) -> Float[Array, "n ..."]:
+        """Stretch (or shear) that the specimen saw, from the recorded one; `respond` gives nominal stress from it, Pa."""
+        return drive
 
-    def energy(self, p: Mapping[str, Array], strain: Strain, test: Any) -> Float[Array, "..."] | float:
-        """Strain energy added to the base energy, Pa."""
+    def energy(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."] | float:
+        """Strain energy added to the base energy, Pa; `strain` is in the sample's frame."""
         return 0.0
 
-    def memory(self, p: Mapping[str, Array], test: Any, state: Any) -> Any:
-        """Isochoric PK2 stress with history, from the elastic one (see `experiments/homogeneous.py`)."""
+    def volume(
+        self, p: Mapping[str, Array], test: MaterialTest, mean: Float[Array, " n"]
+    ) -> Float[Array, " n"] | float:
+        """Added logarithmic volume strain ln J, from the mean Cauchy stress (tension positive), Pa."""
+        return 0.0
+
+    def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:
+        """Isochoric stress with history, from the elastic one."""
         return state
 
-    def stress(self, p: Mapping[str, Array], test: Any, stress: Float[Array, "n ..."]) -> Float[Array, "n ..."]:
+    def stress(
+        self, p: Mapping[str, Array], test: MaterialTest, stress: Float[Array, "n ..."]
+    ) -> Float[Array, "n ..."]:
         """Nominal stress as reported, from the specimen's own."""
         return stress
 

@@ -1,0 +1,212 @@
+"""Material tests: the same strain everywhere in the specimen, so that a prediction is algebra at every sample.
+
+One route serves all kinds. The driven stretch or shear passes the rig's effects; the kind of test and the free faces
+give the deformation gradient
+
+    F = [[a, g, 0], [0, b, 0], [0, 0, c]]   (axes: loaded, second, free),
+
+the isochoric PK2 stress is twice the derivative of the whole strain energy by C, effects with memory change its history, the
+pressure follows from the free third face (P33 = 0), and the nominal stress passes the rig and the sensor.
+All functions are pure; time is the trailing axis of every tensor component.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from tissuejax.effects.effect import Effect
+from tissuejax.effects.material_test import MaterialTest, Stress
+from tissuejax.energies.strain import Strain
+from tissuejax.errors import InputError, unknown
+from tissuejax.experiments.experiment import Experiment
+from tissuejax.experiments.free_faces import lateral
+from tissuejax.experiments.kinematics import Gradient, deformation, hydrostatic, in_sample, nominal, right_cauchy_green
+from tissuejax.model import Model
+from tissuejax.parameters import under
+from tissuejax.recordings.recording import Channel, Recording
+from tissuejax.tensors import Sym
+
+Values = Mapping[str, Array]
+
+
+class Homogeneous(Experiment):
+    """A material test. Members are data: how the specimen is driven and what its free faces do.
+
+    Class data:
+        mode: "extension", "biaxial" or "shear".
+        driven: the recorded input, "stretch" or "shear".
+        columns: number of driven (and recorded) directions.
+        second, swell: exponents of the second stretch, where one stretch is driven.
+    """
+
+    kind: ClassVar[str] = "homogeneous"
+    mode: ClassVar[str]
+    driven: ClassVar[str]
+    columns: ClassVar[int]
+    second: ClassVar[float] = 0.0
+    swell: ClassVar[float] = 0.0
+
+    def test(self, recording: Recording) -> MaterialTest:
+        """`recording` as arrays, without the measurement.
+
+        Raises:
+            InputError: no "time" or driven input, wrong shape, or a stretch that is not positive.
+        """
+        time, drive = (self._input(recording, name) for name in ("time", self.driven))
+        expected = time.shape if self.columns == 1 else (*time.shape, self.columns)
+        if drive.shape != expected:
+            raise InputError(f"recording {recording.name}: {self.driven} has shape {drive.shape}, expected {expected}")
+        if self.driven == "stretch" and not np.all(drive > 0):
+            raise InputError(
+                f"recording {recording.name}: stretch {drive.min():g}; it must be positive (1 is undeformed)"
+            )
+        known = {k: float(v) for k, v in recording.attributes.items() if k in ("start", "area", "height", "diameter")}
+        area = known.get("area", np.nan)
+        numbers = {
+            "second": self.second,
+            "swell": self.swell,
+            "axial": float(recording.attributes.get("axial_stretch", 1.0)),
+            "start": known.get("start", 0.0),
+            "area": area,
+            "height": known.get("height", np.nan),
+            "diameter": known.get("diameter", 2 * np.sqrt(area / np.pi)),
+        }
+        frame = axes(recording.attributes.get("direction"))
+        arrays = {name: np.asarray(value, float) for name, value in numbers.items()}
+        return MaterialTest(time=time, drive=drive, frame=frame, mode=self.mode, **arrays)
+
+    def _input(self, recording: Recording, name: str) -> np.ndarray:
+        if name not in recording.inputs:
+            raise InputError(
+                f"recording {recording.name} ({self.name}) has no {name!r}; it has {', '.join(sorted(recording.inputs))}"
+            )
+        return np.asarray(recording.inputs[name], float)
+
+    def predict(self, model: Model, values: Values, recording: Recording) -> Recording:
+        """The recording that `model` would have given; see `Experiment.predict`."""
+        known = local(model, values, recording.name)
+        return reported(recording, nominal_stress(model.across(()), known, self.test(recording)))
+
+
+def axes(direction: object | None) -> np.ndarray:
+    """Rows: loaded, second and free axis of a test in the sample's frame.
+
+    The free axis is the one closest to the sample's z (to its y if loaded along z); without a direction the test's
+    axes are the sample's.
+    """
+    if direction is None:
+        return np.eye(3)
+    first = np.asarray(direction, float) / np.linalg.norm(direction)
+    near = np.array([0.0, 0.0, 1.0]) if abs(first[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    third = near - (near @ first) * first
+    third /= np.linalg.norm(third)
+    return np.stack([first, np.cross(third, first), third])
+
+
+def local(model: Model, values: Values, recording: str) -> dict[str, Array]:
+    """Every declared parameter's value in one recording: its own, the common one, or the default.
+
+    Raises:
+        InputError: a path that the model doesn't know.
+    """
+    declared = model.declared
+    found = {}
+    for path, parameter in declared.items():
+        source = next((s for s in model.source_of(path, recording) if s in values), None)
+        found[path] = parameter.default if source is None else values[source]
+    for path in values:
+        if path not in declared and not any(path.startswith(f"{d}.") and p.each for d, p in declared.items()):
+            raise unknown("parameter", path, model.parameters)
+    return found
+
+
+def reported(recording: Recording, stress: Float[Array, "n ..."]) -> Recording:
+    """`recording` with predicted nominal stress in place of the measured one."""
+    channel = Channel(recording.inputs["time"], stress, "Pa")
+    return Recording(
+        recording.name, recording.experiment, recording.inputs, {"nominal_stress": channel}, recording.attributes
+    )
+
+
+def nominal_stress(model: Model, values: Values, test: MaterialTest) -> Float[Array, "n ..."]:
+    """Nominal stress that the load cell would report, Pa; (n,), or (n, 2) for a biaxial test.
+
+    Args:
+        model: energy and effects.
+        values: one value for every declared parameter (`Model.declared`).
+        test: what was done.
+    """
+    effects = [(effect, under(f"effects.{effect.name}", values)) for effect in model.ordered]
+
+    def seen_from(i: int, drive: Array) -> Array:
+        """Stress of the specimen if the rig, from its i-th effect inwards, is driven by `drive`."""
+        for j, (effect, p) in enumerate(effects[i:], start=i):
+            drive = effect.stretch(p, test, drive, lambda d, after=j + 1: seen_from(after, d))
+        return specimen_stress(model, values, test, drive)
+
+    stress = seen_from(0, test.drive)
+    for effect, p in reversed(effects):
+        stress = effect.stress(p, test, stress)
+    return stress
+
+
+def specimen_stress(
+    model: Model, values: Values, test: MaterialTest, drive: Float[Array, "n ..."]
+) -> Float[Array, "n ..."]:
+    """Nominal stress of the specimen itself, rig and sensor left out, Pa."""
+    effects = [(effect, under(f"effects.{effect.name}", values)) for effect in model.ordered]
+
+    def isochoric(C: Sym) -> Stress:
+        return elastic(model, values, test, C)
+
+    def at(ln_J: Array) -> tuple[Gradient, Sym]:
+        F = deformation(test, drive, ln_J, skew)
+        state = isochoric(right_cauchy_green(F))
+        for effect, p in effects:
+            state = effect.memory(p, test, state)
+        return F, state.S
+
+    ln_J, skew = lateral(model, values, test, drive, isochoric)
+    swelling = [(effect, p) for effect, p in effects if type(effect).volume is not Effect.volume]
+    if swelling:
+        ln_J = _swollen(swelling, test, ln_J, at)
+    F, S = at(ln_J)
+    return nominal(test, S, F)
+
+
+def elastic(model: Model, values: Values, test: MaterialTest, C: Sym) -> Stress:
+    """Elastic isochoric PK2 stress 2 dpsi/dC in the test's axes, psi being the base energy and what effects add to it."""
+
+    def total(C: Sym) -> tuple[Array, Array]:
+        strain = Strain.of(C if model.isotropic else in_sample(C, test.frame))
+        psi = model.energy.isochoric(under("energy", values), strain)
+        for effect in model.ordered:
+            psi = psi + effect.energy(under(f"effects.{effect.name}", values), strain)
+        return jnp.sum(psi), psi
+
+    # An off-diagonal component stands for two entries of C, so its derivative is doubled already.
+    (_, psi), g = jax.value_and_grad(total, has_aux=True)(C)
+    return Stress(Sym(2 * g.xx, 2 * g.yy, 2 * g.zz, g.xy, g.xz, g.yz), psi, C)
+
+
+def _swollen(
+    effects: list[tuple[Effect, Values]],
+    test: MaterialTest,
+    ln_J: Float[Array, " n"],
+    at: Callable[[Array], tuple[Gradient, Sym]],
+) -> Float[Array, " n"]:
+    """ln J with the volume strain that effects add under the mean stress, which depends on it: a fixed point.
+
+    The map contracts by about (shear modulus) / (bulk modulus); eight passes settle it to 1e-4 of the effect at 1/3.
+    """
+
+    def improved(guess: Array, _: None) -> tuple[Array, None]:
+        F, S = at(guess)
+        mean = hydrostatic(S, F) * jnp.exp(-guess)
+        return ln_J + sum(effect.volume(p, test, mean) for effect, p in effects), None
+
+    return jax.lax.scan(improved, ln_J, None, length=8)[0]

@@ -1,0 +1,127 @@
+"""The predictor of material tests: one compiled function for all recordings of like mode and padded length.
+
+Compilation is what costs, so it is shared: the model is static (two models of equal structure are one), everything
+else is an argument, and time series are padded to multiples of 256 samples by repeating the last one. A recording, a sample or a
+multistart later runs the same code.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from tissuejax.effects.material_test import MaterialTest
+from tissuejax.errors import InputError, unknown
+from tissuejax.experiments.catalogue import experiment
+from tissuejax.experiments.homogeneous import local, nominal_stress, reported
+from tissuejax.experiments.predictor import Predictor, Tangents
+from tissuejax.model import Model
+from tissuejax.parameters import Values
+from tissuejax.recordings.recording import Recording, Sample
+
+BLOCK = 256
+
+
+class HomogeneousPredictor(Predictor):
+    """Predicts material tests; see `Predictor`.
+
+    Attributes:
+        tests: what was done in each recording, padded.
+    """
+
+    name: ClassVar[str] = "homogeneous"
+    model: Model
+    sample: Sample
+    names: tuple[str, ...]
+    tests: Mapping[str, MaterialTest]
+
+    @classmethod
+    def prepare(cls, model: Model, sample: Sample, names: tuple[str, ...], **options) -> "HomogeneousPredictor":
+        """See `predictor`; takes no options."""
+        if options:
+            raise InputError(f"material tests take no option {', '.join(options)}; leave it out")
+        tests = {}
+        for name in names:
+            recording = sample.recordings[name]
+            tests[name] = padded(experiment(recording.experiment).test(recording))
+        return cls(model.across(names), sample, names, tests)
+
+    def of(self, names: Sequence[str]) -> "HomogeneousPredictor":
+        """The same model for other recordings of the sample."""
+        return self.prepare(self.model, self.sample, tuple(names))
+
+    def predict(self, values: Values) -> dict[str, Recording]:
+        """Predicted recordings by name; see `Predictor.predict`."""
+        return {
+            name: self._reported(name, _predict(self.model.across(()), _vector(self._local(values, name)), test))
+            for name, test in self.tests.items()
+        }
+
+    def jacobian(self, values: Values, paths: Sequence[str]) -> tuple[dict[str, Recording], Tangents]:
+        """Prediction and derivatives; see `Predictor.jacobian`."""
+        for path in paths:
+            if path not in self.model.parameters:
+                raise unknown("parameter", path, self.model.parameters)
+        bare = self.model.across(())
+        declared = list(self.model.declared)
+        recordings, tangents = {}, {path: {} for path in paths}
+        for name, test in self.tests.items():
+            basis = np.zeros((len(paths), len(declared)))
+            for i, path in enumerate(paths):
+                for j, generic in enumerate(declared):
+                    basis[i, j] = path in self.model.source_of(generic, name)
+            stress, slopes = _linearised(bare, _vector(self._local(values, name)), test, basis)
+            recordings[name] = self._reported(name, stress)
+            slopes = self._cut(name, jnp.moveaxis(slopes, 1, 0) if _traced(slopes) else np.swapaxes(slopes, 0, 1))
+            for i, path in enumerate(paths):
+                tangents[path][name] = {"nominal_stress": slopes[:, i]}
+        return recordings, tangents
+
+    def _local(self, values: Values, name: str) -> list[Array]:
+        return list(local(self.model, values, name).values())
+
+    def _cut(self, name: str, padded_series: Array) -> Array:
+        """Without padding; on the host where possible, as a slice on the device is compiled for each length."""
+        n = len(self.sample.recordings[name].inputs["time"])
+        return padded_series[:n] if _traced(padded_series) else np.asarray(padded_series)[:n]
+
+    def _reported(self, name: str, stress: Array) -> Recording:
+        return reported(self.sample.recordings[name], self._cut(name, stress))
+
+
+def padded(test: MaterialTest) -> MaterialTest:
+    """`test` with its series lengthened to a multiple of 256 by repeating the last sample."""
+    extra = -len(test.time) % BLOCK
+
+    def longer(series: np.ndarray) -> np.ndarray:
+        return np.concatenate([series, np.repeat(series[-1:], extra, axis=0)])
+
+    arrays = {name: getattr(test, name) for name in test.__dataclass_fields__}
+    return MaterialTest(**{**arrays, "time": longer(test.time), "drive": longer(test.drive)})
+
+
+@partial(jax.jit, static_argnums=0)
+def _predict(model: Model, theta: Float[Array, " p"], test: MaterialTest) -> Float[Array, "n ..."]:
+    return nominal_stress(model, dict(zip(model.declared, theta)), test)
+
+
+@partial(jax.jit, static_argnums=0)
+def _linearised(
+    model: Model, theta: Float[Array, " p"], test: MaterialTest, basis: Float[Array, "k p"]
+) -> tuple[Float[Array, "n ..."], Float[Array, "k n ..."]]:
+    """Prediction and its derivative along each row of `basis`; the primal runs once."""
+    stress, along = jax.linearize(lambda x: _predict(model, x, test), theta)
+    return stress, jax.vmap(along)(basis)
+
+
+def _vector(values: list[Array]) -> Float[Array, " p"]:
+    """One array for all values: on the host unless one of them is traced."""
+    return jnp.stack([jnp.asarray(v) for v in values]) if any(map(_traced, values)) else np.array(values, float)
+
+
+def _traced(value: Array) -> bool:
+    return isinstance(value, jax.core.Tracer)
