@@ -44,6 +44,11 @@ def trace_of_square(c: Sym) -> Float[Array, "..."]:
     return c.xx**2 + c.yy**2 + c.zz**2 + 2 * (c.xy**2 + c.xz**2 + c.yz**2)
 
 
+def double_dot(a: Sym, b: Sym) -> Float[Array, "..."]:
+    """a : b = tr(a b) of two symmetric tensors."""
+    return a.xx * b.xx + a.yy * b.yy + a.zz * b.zz + 2 * (a.xy * b.xy + a.xz * b.xz + a.yz * b.yz)
+
+
 def determinant(c: Sym) -> Float[Array, "..."]:
     """det C."""
     return c.xx * (c.yy * c.zz - c.yz * c.yz) - c.xy * (c.xy * c.zz - c.yz * c.xz) + c.xz * (c.xy * c.yz - c.yy * c.xz)

@@ -8,6 +8,7 @@ import re
 
 from tissuejax import energies as package
 from tissuejax.energies.energy import Energy
+from tissuejax.energies.ogden import form
 from tissuejax.energies.volumetric import Volumetric
 from tissuejax.errors import InputError, unknown
 from tissuejax.families import members
@@ -26,16 +27,27 @@ def volumetrics() -> dict[str, type[Volumetric]]:
 
 
 def energy(name: str, ogden_form: str | None = None) -> Energy:
-    """The energy called `name`, e.g. "reduced-polynomial-2".
+    """The energy called `name`, e.g. "reduced-polynomial-2" or "ogden-3+fibre".
 
     Args:
-        name: as on the command line; orders are written at the end.
-        ogden_form: for `ogden-N` only, and there required.
+        name: as on the command line; orders are written at the end, `+fibre` after that.
+        ogden_form: for `ogden-N` only, and there required: one of `ogden.FORMS`.
 
     Raises:
-        InputError: unknown name (the nearest are offered), an order missing or not wanted.
+        InputError: unknown name (the nearest are offered), an order missing or not wanted, an Ogden form likewise.
     """
-    return _of(energies(), "energy", ALIASES.get(name, name))
+    stem, plus, addition = name.partition("+")
+    additions = {n: kind for n, kind in members(package, Energy).items() if n.startswith("+")}
+    if plus and f"+{addition}" not in additions:
+        raise unknown("addition to an energy", f"+{addition}", additions)
+    stem = ALIASES.get(stem, stem)
+    takes_form = stem.rpartition("-")[0] == "ogden"
+    if ogden_form is not None and not takes_form:
+        raise InputError(f"energy {name!r} takes no Ogden form ({ogden_form!r} came): leave it out, or write ogden-N")
+    if takes_form:
+        form(ogden_form)
+    found = _of(energies(), "energy", stem, **({"form": ogden_form} if takes_form else {}))
+    return additions[f"+{addition}"](found) if plus else found
 
 
 def volumetric(name: str) -> Volumetric:
@@ -44,8 +56,17 @@ def volumetric(name: str) -> Volumetric:
 
 
 def name_of(energy: Energy | Volumetric) -> str:
-    """The name under which the catalogue gives this energy."""
+    """The name under which the catalogue gives this energy, e.g. "ogden-3+fibre"."""
+    if hasattr(energy, "matrix"):
+        return name_of(energy.matrix) + energy.name
     return f"{energy.name}-{energy.order}" if hasattr(energy, "order") else energy.name
+
+
+def forms_of(energy: Energy, volumetric: Volumetric | None = None) -> dict[str, str]:
+    """Every choice of form that the constants depend on, for files and reports: {"ogden": ..., "volumetric": ...}."""
+    matrix = getattr(energy, "matrix", energy)
+    forms = {"ogden": matrix.form} if hasattr(matrix, "form") else {}
+    return forms | {"volumetric": volumetric.formula if volumetric else "incompressible"}
 
 
 def _of(found: dict[str, type], kind: str, name: str, **options):

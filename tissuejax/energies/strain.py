@@ -4,6 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from tissuejax.spectral import power_sums
 from tissuejax.tensors import Sym, determinant, trace, trace_of_square
 
 
@@ -34,6 +35,19 @@ class Strain(eqx.Module):
     def I2(self) -> Float[Array, "..."]:
         """Isochoric second invariant J^(-4/3) (tr(C)^2 - tr(C^2)) / 2; 3 at rest."""
         return self._power_of_J(-4 / 3) * 0.5 * (trace(self.C) ** 2 - trace_of_square(self.C))
+
+    def power_sums(self, alphas: tuple[Float[Array, ""], ...]) -> tuple[Float[Array, "..."], ...]:
+        """sum_i lbar_i^alpha over the isochoric principal stretches, for each alpha; 3 at rest.
+
+        Exact with its derivatives (to the third) where stretches are equal; see `spectral.py`.
+        """
+        log_J = jnp.log(self.J)
+        return tuple(jnp.exp(-alpha / 3 * log_J) * total for alpha, total in zip(alphas, power_sums(self.C, alphas)))
+
+    def fibre_stretch_squared(self, along_1: Float[Array, ""], along_2: Float[Array, ""]) -> Float[Array, "..."]:
+        """I4bar = a . Cbar a, the squared isochoric stretch along a = (along_1, along_2, 0), a unit vector."""
+        C = self.C
+        return self._power_of_J(-2 / 3) * (along_1**2 * C.xx + along_2**2 * C.yy + 2 * along_1 * along_2 * C.xy)
 
     def _power_of_J(self, exponent: float) -> Float[Array, "..."]:
         """J^exponent as exp(exponent ln J): its derivative reuses the exponential (cheap stress)."""

@@ -1,0 +1,250 @@
+"""Powers of symmetric 3x3 tensors and their traces, differentiable where eigenvalues meet.
+
+Energies in principal stretches need sum_i l_i^alpha = tr C^(alpha/2). Differentiating an eigensolver divides by
+differences of eigenvalues, which vanish at rest and all along a uniaxial test. Here three facts replace that:
+
+- d tr f(C) = f'(C) : dC, with no difference of eigenvalues at all;
+- d f(C) = Q (f[l_i, l_j] o Q^T dC Q) Q^T (Daleckii and Krein; Higham 2008, theorem 3.11), with the divided
+  difference f[x, y] of a power written in expm1, so that it is exact at x = y and free of cancellation nearby;
+- d2 f(C) by second divided differences f[x, y, z], from their integral where the three are close (third derivatives
+  of an energy; a fourth is refused).
+
+All functions have the form f(x) = x^s ln(x)^m, as differentiating in s raises m by one; so exponents may be traced.
+Eigenvalues come from a fixed number of branch-free cyclic Jacobi rotations on components (Golub and Van Loan
+2013, 8.5): no difference between one point and a million, float32 and float64 alike.
+"""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.custom_derivatives import SymbolicZero
+from jaxtyping import Array, Float
+
+from tissuejax.tensors import Sym, double_dot
+
+SWEEPS = 4  # quadratic convergence: 4 reach float64 round-off (tests, also at widely spread eigenvalues)
+CLOSE = 0.1  # below this spread of ln(eigenvalue) second divided differences are integrated
+Vector = tuple[Array, Array, Array]
+
+
+def eigensystem(C: Sym) -> tuple[Vector, tuple[Vector, Vector, Vector]]:
+    """Eigenvalues (unsorted) and unit eigenvectors of a symmetric tensor. Not differentiable; see below."""
+    return _eigensystem(Sym(*jnp.broadcast_arrays(*C)))
+
+
+def power_sums(C: Sym, alphas: tuple[Float[Array, ""], ...]) -> tuple[Float[Array, "..."], ...]:
+    """sum_i l_i^alpha for each alpha, l_i^2 the eigenvalues of C (l_i: principal stretches); it is tr C^(alpha/2)."""
+    C = _prepared(C)
+    return _traces(0, C, tuple(0.5 * jnp.asarray(a) for a in alphas))
+
+
+def powers(C: Sym, exponents: tuple[Float[Array, ""], ...]) -> tuple[Sym, ...]:
+    """C^s for each exponent s (any real, traced or not) of a positive definite symmetric tensor."""
+    return _powers(0, _prepared(C), tuple(1.0 * jnp.asarray(s) for s in exponents))
+
+
+def _prepared(C: Sym) -> Sym:
+    kind = jnp.result_type(*C, float)
+    return Sym(*jnp.broadcast_arrays(*(jnp.asarray(c, dtype=kind) for c in C)))
+
+
+# --- f(x) = x^s ln(x)^m as trace and as tensor, each with its derivative ----------------------------------------------
+
+
+def _f(m: int, s: Array, x: Array) -> Array:
+    log = jnp.log(x)
+    return jnp.exp(s * log) * log**m if m else jnp.exp(s * log)
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0,))
+def _traces(m: int, C: Sym, s: tuple[Array, ...]) -> tuple[Array, ...]:
+    """tr C^s ln(C)^m."""
+    values, _ = _eigensystem(C)
+    return tuple(sum(_f(m, si, x) for x in values) for si in s)
+
+
+@partial(_traces.defjvp, symbolic_zeros=True)
+def _traces_jvp(m, primals, tangents):
+    (C, s), (dC, ds) = primals, tangents
+    dC, along_C = _tangent(dC)
+    out = [jnp.zeros_like(C.xx) for _ in s]
+    if along_C:  # f'(C) : dC, f' = s x^(s-1) ln^m + m x^(s-1) ln^(m-1)
+        less = tuple(si - 1 for si in s)
+        out = [si * double_dot(f, dC) for si, f in zip(s, _powers(m, C, less))]
+        if m:
+            out = [o + m * double_dot(f, dC) for o, f in zip(out, _powers(m - 1, C, less))]
+    if along := [i for i, d in enumerate(ds) if not isinstance(d, SymbolicZero)]:
+        for i, f in zip(along, _traces(m + 1, C, tuple(s[i] for i in along))):
+            out[i] = out[i] + f * ds[i]
+    return _traces(m, C, s), tuple(out)
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0,))
+def _powers(m: int, C: Sym, s: tuple[Array, ...]) -> tuple[Sym, ...]:
+    """C^s ln(C)^m."""
+    values, vectors = _eigensystem(C)
+    return tuple(_assemble(vectors, {(i, i): _f(m, si, x) for i, x in enumerate(values)}) for si in s)
+
+
+@partial(_powers.defjvp, symbolic_zeros=True)
+def _powers_jvp(m, primals, tangents):
+    (C, s), (dC, ds) = primals, tangents
+    dC, along_C = _tangent(dC)
+    out = list(_derivative(m, C, s, dC)) if along_C else [Sym(*map(jnp.zeros_like, C)) for _ in s]
+    if along := [i for i, d in enumerate(ds) if not isinstance(d, SymbolicZero)]:
+        for i, f in zip(along, _powers(m + 1, C, tuple(s[i] for i in along))):
+            out[i] = _added(out[i], f, ds[i])
+    return _powers(m, C, s), tuple(out)
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0,))
+def _derivative(m: int, C: Sym, s: tuple[Array, ...], H: Sym) -> tuple[Sym, ...]:
+    """Derivative of C^s ln(C)^m in the direction H (Daleckii and Krein)."""
+    values, vectors = _eigensystem(C)
+    h = _in_eigenframe(vectors, H)
+    pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
+    return tuple(_assemble(vectors, {ij: _first(m, si, *(values[i] for i in ij)) * h[ij] for ij in pairs}) for si in s)
+
+
+@partial(_derivative.defjvp, symbolic_zeros=True)
+def _derivative_jvp(m, primals, tangents):
+    (C, s, H), (dC, ds, dH) = primals, tangents
+    dC, along_C = _tangent(dC)
+    dH, along_H = _tangent(dH)
+    out = [Sym(*map(jnp.zeros_like, C)) for _ in s]
+    if along_H:
+        out = list(_derivative(m, C, s, dH))
+    if along_C:
+        out = [_added(o, f) for o, f in zip(out, _second_derivative(m, C, s, H, dC))]
+    if along := [i for i, d in enumerate(ds) if not isinstance(d, SymbolicZero)]:
+        for i, f in zip(along, _derivative(m + 1, C, tuple(s[i] for i in along), H)):
+            out[i] = _added(out[i], f, ds[i])
+    return _derivative(m, C, s, H), tuple(out)
+
+
+def _second_derivative(m: int, C: Sym, s: tuple[Array, ...], H: Sym, K: Sym) -> tuple[Sym, ...]:
+    """Second derivative of C^s ln(C)^m in the directions H and K."""
+    values, vectors = _eigensystem(C)
+    h, k = _in_eigenframe(vectors, H), _in_eigenframe(vectors, K)
+    out = []
+    for si in s:
+        cache = {}
+        frame = {}
+        for i, j in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]:
+            total = 0.0
+            for n in range(3):
+                triple = tuple(sorted((i, n, j)))
+                if triple not in cache:
+                    cache[triple] = _second(m, si, *(values[q] for q in triple))
+                total = total + cache[triple] * (h[i, n] * k[n, j] + k[i, n] * h[n, j])
+            frame[i, j] = total
+        out.append(_assemble(vectors, frame))
+    return tuple(out)
+
+
+# --- divided differences ----------------------------------------------------------------------------------------------
+
+
+def _phi(u: Array) -> Array:
+    """expm1(u) / u, with value and derivatives right at u = 0."""
+    near = jnp.abs(u) < 1e-3
+    safe = jnp.where(near, 1.0, u)
+    return jnp.where(near, 1 + u / 2 * (1 + u / 3 * (1 + u / 4 * (1 + u / 5))), jnp.expm1(safe) / safe)
+
+
+def _first(m: int, s: Array, x: Array, y: Array) -> Array:
+    """f[x, y] = (f(x) - f(y)) / (x - y), f'(x) at x = y, without cancellation."""
+    log_x, log_y = jnp.log(x), jnp.log(y)
+    u = log_x - log_y
+    log_difference = 1 / (y * _phi(u))
+    difference = s * jnp.exp(s * log_y) * _phi(s * u) * log_difference
+    for lower in range(m):  # product rule of divided differences, f = (x^s ln^lower) ln
+        difference = difference * log_x + _f(lower, s, y) * log_difference
+    return difference
+
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+_NODES, _WEIGHTS = 0.5 * (_NODES + 1), 0.5 * _WEIGHTS
+
+
+def _second(m: int, s: Array, x: Array, y: Array, z: Array) -> Array:
+    """f[x, y, z]: by the recurrence on the two that are farthest apart, by its integral where all three are close."""
+    low, high = jnp.minimum(jnp.minimum(x, y), z), jnp.maximum(jnp.maximum(x, y), z)
+    middle = jnp.maximum(jnp.minimum(x, y), jnp.minimum(jnp.maximum(x, y), z))
+    close = jnp.log(high) - jnp.log(low) < CLOSE
+    gap = jnp.where(close, 1.0, high - low)
+    apart = (_first(m, s, high, middle) - _first(m, s, middle, low)) / gap
+    integral = 0.0
+    for a, wa in zip(_NODES, _WEIGHTS):  # Hermite-Genocchi over the triangle, t2 = a b
+        for b, wb in zip(_NODES, _WEIGHTS):
+            integral = integral + wa * wb * a * _curvature(m, s, low + a * (middle - low) + a * b * (high - middle))
+    return jnp.where(close, integral, apart)
+
+
+def _curvature(m: int, s: Array, x: Array) -> Array:
+    """f''(x)."""
+    curvature = s * (s - 1) * _f(m, s - 2, x)
+    if m >= 1:
+        curvature = curvature + m * (2 * s - 1) * _f(m - 1, s - 2, x)
+    if m >= 2:
+        curvature = curvature + m * (m - 1) * _f(m - 2, s - 2, x)
+    return curvature
+
+
+# --- components -------------------------------------------------------------------------------------------------------
+
+
+@jax.custom_jvp
+def _eigensystem(C: Sym) -> tuple[Vector, tuple[Vector, Vector, Vector]]:
+    a = {(0, 0): C.xx, (1, 1): C.yy, (2, 2): C.zz, (0, 1): C.xy, (0, 2): C.xz, (1, 2): C.yz}
+    one, zero = jnp.ones_like(C.xx), jnp.zeros_like(C.xx)
+    v = [(one, zero, zero), (zero, one, zero), (zero, zero, one)]
+    for _ in range(SWEEPS):
+        for p, q, r in ((0, 1, 2), (0, 2, 1), (1, 2, 0)):
+            d, off = a[q, q] - a[p, p], 2 * a[p, q]
+            reach = jnp.abs(d) + jnp.sqrt(d * d + off * off)
+            t = jnp.where(d >= 0, off, -off) / jnp.where(reach > 0, reach, 1.0)
+            c = 1 / jnp.sqrt(t * t + 1)
+            s = t * c
+            rp, rq = tuple(sorted((r, p))), tuple(sorted((r, q)))
+            a[p, p], a[q, q], a[p, q] = a[p, p] - t * a[p, q], a[q, q] + t * a[p, q], zero
+            a[rp], a[rq] = c * a[rp] - s * a[rq], s * a[rp] + c * a[rq]
+            pairs = list(zip(v[p], v[q]))
+            v[p], v[q] = tuple(c * x - s * y for x, y in pairs), tuple(s * x + c * y for x, y in pairs)
+    return (a[0, 0], a[1, 1], a[2, 2]), tuple(v)
+
+
+@_eigensystem.defjvp
+def _eigensystem_jvp(primals, tangents):
+    raise NotImplementedError("a fourth derivative of a spectral energy in C: derivatives are exact to the third only")
+
+
+def _tangent(d: Sym) -> tuple[Sym, bool]:
+    """A tangent with symbolic zeros filled in, and whether there is anything in it."""
+    some = any(not isinstance(x, SymbolicZero) for x in d)
+    return Sym(*(jnp.zeros(x.shape, x.dtype) if isinstance(x, SymbolicZero) else x for x in d)), some
+
+
+def _added(A: Sym, B: Sym, factor: Array | float = 1.0) -> Sym:
+    return Sym(*(a + b * factor for a, b in zip(A, B)))
+
+
+def _assemble(v: tuple[Vector, ...], frame: dict[tuple[int, int], Array]) -> Sym:
+    """sum_ij frame_ij v_i v_j^T, frame given by its upper triangle (absent entries are zero)."""
+
+    def entry(k: int, l: int) -> Array:
+        return sum(
+            x * (v[i][k] * v[i][l] if i == j else v[i][k] * v[j][l] + v[j][k] * v[i][l]) for (i, j), x in frame.items()
+        )
+
+    return Sym(entry(0, 0), entry(1, 1), entry(2, 2), entry(0, 1), entry(0, 2), entry(1, 2))
+
+
+def _in_eigenframe(v: tuple[Vector, ...], H: Sym) -> dict[tuple[int, int], Array]:
+    """v_i . H v_j for all i, j."""
+    rows = ((H.xx, H.xy, H.xz), (H.xy, H.yy, H.yz), (H.xz, H.yz, H.zz))
+    Hv = [tuple(sum(h * x for h, x in zip(row, vj)) for row in rows) for vj in v]
+    frame = {(i, j): sum(x * y for x, y in zip(v[i], Hv[j])) for i in range(3) for j in range(i, 3)}
+    return frame | {(j, i): h for (i, j), h in frame.items()}
