@@ -1,0 +1,98 @@
+"""What every recording must satisfy, whichever format it came in; each refusal says where, what was found, what is
+expected."""
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from jaxtyping import Float
+
+from tissuejax.errors import InputError
+from tissuejax.recordings.recording import Recording, Sample
+
+
+def refusal(file: object, item: str, found: str, expected: str, advice: str = "") -> InputError:
+    """The error for one item of a file: which file, which item, what was found, what was expected, what to do."""
+    return InputError(f"{file}: {item}: found {found}, expected {expected}.{' ' if advice else ''}{advice}")
+
+
+def finite(values: Float[np.ndarray, "..."], file: object, item: str, nan_allowed: bool = False) -> None:
+    """Refuse NaN and infinities (`nan_allowed`: infinities alone), naming the first and how many there are."""
+    bad = np.isinf(values) if nan_allowed else ~np.isfinite(values)
+    if bad.any():
+        first = tuple(int(i) for i in np.argwhere(bad)[0])
+        where = f" at index {first[0] if len(first) == 1 else first}" if first else ""
+        allowed = "finite numbers or NaN" if nan_allowed else "finite numbers"
+        raise refusal(
+            file, item, f"{values[first]}{where} ({bad.sum()} in all)", allowed, "Remove or mend these samples."
+        )
+
+
+def increasing(time: Float[np.ndarray, " n"], file: object, item: str) -> None:
+    """Refuse a time vector that is not strictly increasing, naming the first offending sample."""
+    steps = np.diff(time)
+    if (steps <= 0).any():
+        i = int(np.argmax(steps <= 0)) + 1
+        found = f"{time[i]:.9g} s at index {i} after {time[i - 1]:.9g} s ({(steps <= 0).sum()} such steps)"
+        advice = "Sort the samples, drop repeats, or split the file where a new test begins."
+        raise refusal(file, item, found, "strictly increasing times", advice)
+
+
+def positive(
+    values: Float[np.ndarray, "..."] | float, file: object, item: str, meaning: str, zero: bool = False
+) -> None:
+    """Refuse values that are negative, or zero unless `zero`; `meaning` says what they should be, e.g. "a length"."""
+    values = np.asarray(values)
+    bad = values < 0 if zero else values <= 0
+    if bad.any():
+        first = tuple(int(i) for i in np.argwhere(bad)[0])
+        where = f" at index {first[0] if len(first) == 1 else first}" if first else ""
+        raise refusal(
+            file, item, f"{values[first]:.6g}{where}", f"{meaning}, {'not negative' if zero else 'above zero'}"
+        )
+
+
+def stretches(values: Float[np.ndarray, "n ..."], file: object, item: str) -> None:
+    """Refuse stretches that are not above zero, guessing at the usual cause."""
+    if (values <= 0).any():
+        advice = "A stretch is current over original length (1 = undeformed); if these are strains, add 1 or say so."
+        i = int(np.argwhere(values <= 0)[0][0])
+        raise refusal(file, item, f"stretch {values.min():.6g} (first at index {i})", "stretches above zero", advice)
+
+
+def distinct(recordings: Mapping[str, Recording] | Iterable[tuple[str, Recording]]) -> None:
+    """Refuse two recordings with the same data, whatever their names: it would count one measurement twice.
+
+    Args:
+        recordings: recordings by name, or pairs of a label (e.g. "file.h5: r1") and a recording.
+
+    Raises:
+        InputError: which two are the same.
+    """
+    seen: dict[tuple, str] = {}
+    pairs = recordings.items() if isinstance(recordings, Mapping) else recordings
+    for label, recording in pairs:
+        arrays = {f"inputs {k}": v for k, v in recording.inputs.items()}
+        arrays |= {f"channels {k}": c.values for k, c in recording.channels.items()}
+        key = (recording.experiment, *((k, np.asarray(arrays[k]).tobytes()) for k in sorted(arrays)))
+        if key in seen:
+            raise InputError(
+                f"recordings {seen[key]!r} and {label!r} hold identical data: list each recording once "
+                "(repeats of a test differ by noise)"
+            )
+        seen[key] = label
+
+
+def enough(sample: Sample, n_parameters: int, names: Iterable[str] | None = None) -> int:
+    """The number of measured values in the named recordings (all where None), refused if no more than parameters.
+
+    Raises:
+        InputError: fewer values than parameters + 1.
+    """
+    chosen = [sample.recordings[n] for n in (sample.recordings if names is None else names)]
+    count = sum(int(np.isfinite(np.asarray(c.values)).sum()) for r in chosen for c in r.channels.values())
+    if count <= n_parameters:
+        raise InputError(
+            f"sample {sample.name!r}: {count} measured values for {n_parameters} free parameters; expected at least "
+            f"{n_parameters + 1}: record more, free fewer parameters, or choose a smaller energy"
+        )
+    return count

@@ -1,0 +1,112 @@
+"""Reading and writing recordings, whatever their format: the one door to files of measured data.
+
+    sample = read("liver.h5")
+    sample = read("fits/ecoflex/ecoflex.toml#EF10_0T")      # one sample of many
+    write(sample, "ecoflex.h5")
+
+The format is chosen by the content of a file, then by its ending; a new format is one new file in this folder.
+"""
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import tissuejax.recordings as folder
+from tissuejax.errors import InputError, unknown
+from tissuejax.families import members
+from tissuejax.recordings import checks
+from tissuejax.recordings.format import Format
+from tissuejax.recordings.hdf5_writing import write
+from tissuejax.recordings.recording import Sample
+
+__all__ = ["formats", "names", "read", "read_all", "read_each", "write"]
+
+
+def formats() -> dict[str, Format]:
+    """The formats that can be read, by name."""
+    return {name: kind() for name, kind in members(folder, Format).items()}
+
+
+def names(path: str | os.PathLike) -> list[str]:
+    """The names of the samples in a file, in file order."""
+    path, chosen = _split(path)
+    return [chosen] if chosen else _format(path).names(path)
+
+
+def read(path: str | os.PathLike, name: str | None = None) -> Sample:
+    """The sample in a file.
+
+    Args:
+        path: a recording file or a side file; "file#NAME" means `name`.
+        name: which sample, where the file holds several.
+
+    Raises:
+        InputError: no such file, an empty file, an unknown format, anything the format's checks refuse, several
+            samples and no name, or an unknown name.
+    """
+    path, chosen = _split(path)
+    name = name or chosen
+    kind = _format(path)
+    known = kind.names(path)
+    if name is None:
+        if len(known) > 1:
+            first = ", ".join(known[:8]) + (", ..." if len(known) > 8 else "")
+            raise InputError(
+                f"{path}: found {len(known)} samples ({first}), expected one: name it as {path}#{known[0]}"
+            )
+        name = known[0]
+    if name not in known:
+        raise InputError(f"{path}: {unknown('sample', name, known)}")
+    return kind.read(path, name)
+
+
+def read_all(path: str | os.PathLike) -> dict[str, Sample]:
+    """Every sample of a file by name, in file order."""
+    path, chosen = _split(path)
+    kind = _format(path)
+    return {name: kind.read(path, name) for name in ([chosen] if chosen else kind.names(path))}
+
+
+def read_each(paths: Iterable[str | os.PathLike]) -> dict[str, Sample]:
+    """One sample from each of several files by sample name, refusing a recording that comes twice.
+
+    Raises:
+        InputError: as `read`; two samples with one name; identical recordings.
+    """
+    found: dict[str, Sample] = {}
+    labels = []
+    for path in paths:
+        sample = read(path)
+        labels += [(f"{path}: {name}", recording) for name, recording in sample.recordings.items()]
+        checks.distinct(labels)
+        if sample.name in found:
+            raise InputError(f"{path}: a sample named {sample.name!r} came already: give each sample its own name")
+        found[sample.name] = sample
+    return found
+
+
+def _split(path: str | os.PathLike) -> tuple[Path, str | None]:
+    text = os.fspath(path)
+    if "#" in text and not Path(text).exists():
+        text, _, name = text.rpartition("#")
+        return Path(text), name or None
+    return Path(text), None
+
+
+def _format(path: Path) -> Format:
+    known: Mapping[str, Format] = formats()
+    what = "; ".join(f"{name} ({', '.join(f.endings)})" for name, f in known.items())
+    if not path.exists():
+        near = sorted(p.name for p in path.parent.glob(f"*{path.suffix}"))[:8] if path.parent.is_dir() else []
+        there = f" In {path.parent} there are: {', '.join(near)}." if near else ""
+        raise InputError(f"{path}: no such file.{there}")
+    if path.is_dir():
+        raise InputError(f"{path}: found a folder, expected a file: {what}")
+    with open(path, "rb") as file:
+        head = file.read(4096)
+    if not head:
+        raise InputError(f"{path}: found an empty file, expected one of: {what}")
+    for kind in known.values():
+        if kind.recognises(path, head):
+            return kind
+    raise InputError(f"{path}: found a file of another format, expected one of: {what}")
