@@ -6,14 +6,17 @@ At its neutral value an effect reproduces the Model without it to the last bit, 
 
 import abc
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import equinox as eqx
 from jaxtyping import Array, Float
 
 from tissuejax.effects.material_test import MaterialTest, Stress
+from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.energies.strain import Strain
 from tissuejax.parameters import Parameter
+from tissuejax.recordings.recording import Channel
+from tissuejax.tled.scene import Scene
 
 Respond = Callable[[Array], Array]
 
@@ -62,7 +65,7 @@ class Effect(eqx.Module):
     def stretch(
         self, p: Mapping[str, Array], test: MaterialTest, drive: Float[Array, "n ..."], respond: Respond
     ) -> Float[Array, "n ..."]:
-        """Stretch (or shear) that the specimen saw, from the recorded one; `respond` gives nominal stress from it, Pa."""
+        """Stretch (or shear) that the specimen saw, from the recorded one; `respond` gives its nominal stress, Pa."""
         return drive
 
     def energy(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."] | float:
@@ -85,10 +88,12 @@ class Effect(eqx.Module):
         """Nominal stress as reported, from the specimen's own."""
         return stress
 
-    def scene(self, p: Mapping[str, Array], scene: Any) -> Any:
+    def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
         """The probing scene with this effect in it (see `tled/scene.py`)."""
         return scene
 
-    def channels(self, p: Mapping[str, Array], channels: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Probing channels as the sensors report them."""
+    def channels(
+        self, p: Mapping[str, Array], test: ProbingTest, channels: Mapping[str, Channel]
+    ) -> Mapping[str, Channel]:
+        """Probing channels ("force", "markers") as the sensors report them, from the true series on a fine clock."""
         return channels

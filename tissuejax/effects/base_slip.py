@@ -1,0 +1,36 @@
+"""The support does not hold the tissue: its base gives way or slides."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from jaxtyping import Array
+
+from tissuejax.effects.effect import Effect
+from tissuejax.effects.probing_test import ProbingTest
+from tissuejax.parameters import Parameter
+from tissuejax.tled.scene import Scene
+
+
+class BaseSlip(Effect):
+    """Tangential slip of the base: `compliance` times traction at once, plus `fluidity` times traction per second.
+
+    Neutral: both 0 (bonded). Reveals: markers that spread sideways, also far from the probe; with fluidity, creep of
+    markers and a residual shift afterwards. Blind: thick tissue over shallow probing, where the base feels nothing.
+    """
+
+    name: ClassVar[str] = "base-slip"
+    kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    reveals: ClassVar[str] = "markers spread sideways more than a bonded base allows"
+    blind: ClassVar[str] = "depths small against the thickness; material tests"
+    source: ClassVar[str] = "Newtonian or elastic interlayer; the source fixes the base (Lister 2012, 2.2.4)"
+    amplitudes: ClassVar[tuple[str, ...]] = ("compliance", "fluidity")
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (
+            Parameter("compliance", "m/Pa", 0.0, 0.0, 1e-3, "slip per shear traction", scale=1e-6),
+            Parameter("fluidity", "m/(s Pa)", 0.0, 0.0, 1e-3, "rate of slip per shear traction", scale=3e-7),
+        )
+
+    def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
+        return scene.put({"support.compliance": p["compliance"], "support.fluidity": p["fluidity"]})

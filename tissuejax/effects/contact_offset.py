@@ -1,0 +1,40 @@
+"""First touch misjudged: the probe is really lower than recorded, or its clock is late."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from tissuejax.effects.effect import Effect
+from tissuejax.effects.probing_test import ProbingTest
+from tissuejax.parameters import Parameter
+from tissuejax.tled.scene import Scene
+
+
+class ContactOffset(Effect):
+    """z_true(t) = z_recorded(t - delay) - depth. Neutral: both 0.
+
+    Reveals: force that starts before or after the recorded first touch, with the same shift at every site; a delay also
+    shifts the corners of the path. Blind: a single approach at one speed mixes depth and delay.
+    """
+
+    name: ClassVar[str] = "contact-offset"
+    kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    reveals: ClassVar[str] = "force begins too early or too late, by the same depth at every site"
+    blind: ClassVar[str] = "one approach at one speed can't tell depth from delay; material tests"
+    source: ClassVar[str] = "Lister 2012, 2.2.1 (contact circuit)"
+    amplitudes: ClassVar[tuple[str, ...]] = ("depth", "delay")
+    order: ClassVar[int] = 0
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (
+            Parameter("depth", "m", 0.0, -3e-3, 3e-3, "how much lower the probe really was", scale=3e-4),
+            Parameter("delay", "s", 0.0, -0.5, 0.5, "how late the probe's clock is", scale=0.03),
+        )
+
+    def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
+        down = jnp.array([0.0, 0.0, -1.0]) * p["depth"]
+        offset = down if scene.probe.offset is None else scene.probe.offset + down
+        return scene.put({"probe.offset": offset, "probe.time": scene.probe.time + p["delay"]})

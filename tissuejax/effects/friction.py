@@ -1,0 +1,34 @@
+"""Coulomb friction between probe and tissue."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from jaxtyping import Array
+
+from tissuejax.effects.effect import Effect
+from tissuejax.effects.probing_test import ProbingTest
+from tissuejax.parameters import Parameter
+from tissuejax.tled.scene import Scene
+
+
+class Friction(Effect):
+    """Tangential traction up to `coefficient` times the contact pressure, against sliding. Neutral: 0.
+
+    Reveals: lateral force and hysteresis wherever the probe slides or the surface slips under it, markers near the
+    probe dragged along. Blind: a shallow straight press, where the surface hardly slides.
+    """
+
+    name: ClassVar[str] = "friction"
+    kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    reveals: ClassVar[str] = "lateral force against sliding, and its sign change on the way back"
+    blind: ClassVar[str] = "a shallow straight press on a level surface; material tests"
+    source: ClassVar[str] = "Coulomb; Lister 2012, 2.2.4 assumes 0.1"
+    amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter("coefficient", "1", 0.0, 0.0, 2.0, "friction over normal force", scale=0.1),)
+
+    def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
+        already = scene.probe.friction
+        return scene.put({"probe.friction": p["coefficient"] if already is None else already + p["coefficient"]})
