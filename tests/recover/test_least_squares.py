@@ -138,7 +138,7 @@ def test_profile_agrees_with_the_standard_error_of_a_nearly_linear_problem(rng):
 def test_holdout_is_scored_but_not_fitted(rng):
     sample = toy_sample(rng, TRUE)
     p = problem(sample, names=("r1",))
-    found = fit(p, holdout=ToyPredictor(sample, ("r2",)))
+    found = fit(p, holdout=("r2",))
     assert set(found.channels) == {"r1/nominal_stress"}
     assert set(found.holdout) == {"r2/nominal_stress"}
     assert found.holdout["r2/nominal_stress"].chi2_per_sample < 1.5

@@ -56,6 +56,9 @@ class ToyPredictor:
                 slopes[path][name] = {"nominal_stress": jac[path]}
         return self.predict(values), slopes
 
+    def of(self, names):
+        return type(self)(self.sample, names)
+
     def _time(self, name):
         return jnp.asarray(self.sample.recordings[name].channels["nominal_stress"].time)
 

@@ -7,7 +7,6 @@ lengths repeat.
 
 import time
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,9 +21,6 @@ from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
 from tissuejax.fitting.starts import scaled_to_data, variations
 from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
-
-if TYPE_CHECKING:
-    from tissuejax.experiments.predictor import Predictor
 
 METHODS = ("levenberg-marquardt", *GRADIENT_METHODS)
 AGAIN = 3  # rounds of re-estimating several unknown noise levels
@@ -80,7 +76,7 @@ def fit(
     start: Mapping[str, float] | None = None,
     multistart: int = 4,
     method: str = "levenberg-marquardt",
-    holdout: "Predictor | None" = None,
+    holdout: tuple[str, ...] = (),
     seed: int = 0,
     max_steps: int = 200,
     on_accept: Callable[[int, float, dict[str, float]], None] | None = None,
@@ -92,7 +88,7 @@ def fit(
         start: values to begin with, taken as they are; None scales the problem's moduli to the data first.
         multistart: number of starts (the first as given, the others seeded variations); the best end wins.
         method: "levenberg-marquardt", "adam" or "lbfgs".
-        holdout: a predictor of the same model and sample for the recordings to predict and score only.
+        holdout: recordings of the sample, outside the problem, to predict and score.
         seed: of the further starts.
         max_steps: evaluations for each start.
         on_accept: told evaluations, chi-square and values after every accepted step.
@@ -123,10 +119,9 @@ def fit(
     spread = curvature(problem, values)
     predictions = dict(problem.predictor.predict(values))
     std = dict(problem.noise.std)
-    outside = holdout.names if holdout is not None else ()
-    if holdout is not None:
-        predictions |= holdout.predict(values)
-        std |= _holdout_noise(problem, outside)
+    if holdout:
+        predictions |= problem.predictor.of(holdout).predict(values)
+        std |= _holdout_noise(problem, holdout)
     measured = problem.predictor.sample.recordings
     inside = {name: predictions[name] for name in problem.predictor.names}
     bounds = {p: side for p, side in zip(problem.free, problem.box.at_bound(best.y), strict=True) if side}
@@ -138,7 +133,7 @@ def fit(
         at_bound=bounds,
         chi2=2 * best.cost,
         channels=scores(measured, inside, std),
-        holdout=scores(measured, {name: predictions[name] for name in outside}, std),
+        holdout=scores(measured, {name: predictions[name] for name in holdout}, std),
         predictions=predictions,
         trace=[Iterate(i, 2 * cost, problem.values(x)) for i, (cost, x) in enumerate(best.trace, start=1)],
         starts=starts,

@@ -8,18 +8,15 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
 
 from tissuejax.errors import InputError, unknown
+from tissuejax.experiments.predictor import Predictor
 from tissuejax.fitting.losses import checked_loss
 from tissuejax.fitting.transforms import Box, checked_bounds
 from tissuejax.fitting.weights import Noise
-
-if TYPE_CHECKING:
-    from tissuejax.experiments.predictor import Predictor
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +33,7 @@ class Problem:
         loss: "squares", "soft-l1" or "cauchy".
     """
 
-    predictor: "Predictor"
+    predictor: Predictor
     free: tuple[str, ...]
     start: Mapping[str, float]
     noise: Noise

@@ -1,0 +1,89 @@
+"""From what a user says (which recordings, what is fixed, bounds, priors) to a checked problem."""
+
+from collections.abc import Mapping
+
+from tissuejax.errors import InputError, unknown
+from tissuejax.experiments.predictor import Predictor
+from tissuejax.fitting.problem import Problem
+from tissuejax.fitting.transforms import checked_bounds
+from tissuejax.fitting.weights import noise
+from tissuejax.parameters import checked
+from tissuejax.recordings.recording import Sample
+
+
+def split(
+    sample: Sample, only: tuple[str, ...] = (), holdout: tuple[str, ...] = ()
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the recordings to fit and to hold out, in file order.
+
+    Args:
+        sample: what was recorded.
+        only: fit these (default: all that are not held out).
+        holdout: predict these only.
+
+    Raises:
+        InputError: an unknown name, one listed twice or in both lists, or nothing left to fit.
+    """
+    for kind, names in (("recording", only), ("recording to hold out", holdout)):
+        for name in names:
+            if name not in sample.recordings:
+                raise unknown(kind, name, sample.recordings)
+        if len(set(names)) < len(names):
+            raise InputError(f"a {kind} is listed twice: {', '.join(names)}; list each once")
+    both = sorted(set(only) & set(holdout))
+    if both:
+        raise InputError(f"{', '.join(both)}: to be fitted and held out at once; choose one")
+    fitted = tuple(n for n in sample.recordings if (n in only if only else n not in holdout))
+    if not fitted:
+        raise InputError(f"nothing is left to fit: all of {', '.join(sample.recordings)} are held out")
+    return fitted, tuple(n for n in sample.recordings if n in holdout)
+
+
+def problem(
+    predictor: Predictor,
+    *,
+    free: tuple[str, ...] | None = None,
+    fix: Mapping[str, float] | None = None,
+    start: Mapping[str, float] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+    weights: str | Mapping[str, float] = "auto",
+    channels: tuple[str, ...] = (),
+    loss: str = "squares",
+) -> Problem:
+    """A problem with everything that is not said taken from the declarations.
+
+    Args:
+        predictor: model, sample and the recordings that take part.
+        free: what to estimate; by default all parameters that are neither fixed nor declared frozen.
+        fix: values that stay as they are.
+        start: where to begin; defaults are the declared ones, moved inside any bounds given here.
+        bounds: (lower, upper) by path.
+        priors: (mean, standard deviation) by path.
+        weights: "auto", "uniform", "relative" or standard deviations by channel.
+        channels: only these channels, e.g. ("force",).
+        loss: "squares", "soft-l1" or "cauchy".
+
+    Raises:
+        InputError: unknown paths, values outside their range, empty bounds, too few samples.
+    """
+    declared = predictor.model.parameters
+    fix, start, bounds = dict(fix or {}), dict(start or {}), dict(bounds or {})
+    checked(fix, declared)
+    checked(start, declared)
+    for path in (*bounds, *(free or ()), *(priors or {})):
+        if path not in declared:
+            raise unknown("parameter", path, declared)
+    if free is None:
+        named = {*start, *bounds, *(priors or {})}
+        free = tuple(p for p, d in declared.items() if p not in fix and (not d.frozen or p in named))
+    clash = sorted(set(free) & set(fix))
+    if clash:
+        raise InputError(f"{', '.join(clash)}: fixed and free at once; choose one")
+    values = predictor.model.defaults | start | fix
+    for path, (lower, upper) in bounds.items():
+        lower, upper = checked_bounds(path, lower, upper)
+        if path not in start and path not in fix:
+            values[path] = min(max(values[path], lower), upper)
+    found = noise(predictor.sample, predictor.names, weights, channels)
+    return Problem(predictor, tuple(free), values, found, bounds, dict(priors or {}), loss)

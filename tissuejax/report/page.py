@@ -1,0 +1,86 @@
+"""A self-contained page: text, tables and figures in one HTML file that a colleague can read and keep."""
+
+import base64
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from matplotlib.figure import Figure
+
+from tissuejax import report as package
+from tissuejax.families import members
+from tissuejax.fitting.result import Fit
+from tissuejax.report import sentences
+from tissuejax.report.plot import Plot
+from tissuejax.storage import write_bytes, write_json, write_text
+
+DPI = 100
+
+
+def plots(subject: Any) -> list[Plot]:
+    """All plots that picture this kind of subject, in the order of a page."""
+    kinds = [kind for kind in members(package, Plot).values() if isinstance(subject, kind.subject)]
+    return [kind() for kind in sorted(kinds, key=lambda k: (k.order, k.name))]
+
+
+def figures(subject: Any) -> list[dict[str, Any]]:
+    """Name, caption and PNG of every plot that has something to show."""
+    found = []
+    for plot in plots(subject):
+        data = plot.prepare(subject)
+        if data is not None:
+            found.append({"name": plot.name, "caption": plot.caption(data), "png": png(plot.draw(data))})
+    return found
+
+
+def png(figure: Figure) -> bytes:
+    """A figure as PNG."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=DPI)
+    return buffer.getvalue()
+
+
+def render(template: str, **content: Any) -> str:
+    """A page from a template of this room; figures go in as base64."""
+    loader = jinja2.FileSystemLoader(Path(__file__).parent)
+    environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["base64"] = lambda data: base64.b64encode(data).decode()
+    return environment.get_template(template).render(**content)
+
+
+def write_fit(found: Fit, out: Path, pictures: bool = True) -> dict[str, Path]:
+    """result.json, report.html and one PNG a figure, each written whole or not at all.
+
+    Args:
+        found: the fit.
+        out: folder, made if missing.
+        pictures: False leaves figures and page out (many fits in a row).
+
+    Returns:
+        Paths by name: "result", "page" and the figures.
+    """
+    written = {"result": write_json(out / "result.json", found.record())}
+    if not pictures:
+        return written
+    drawn = figures(found)
+    written |= {f["name"]: write_bytes(out / f"{f['name']}.png", f["png"]) for f in drawn}
+    page = render(
+        "fit.html.j2",
+        title=f"Fit of {found.problem.predictor.sample.name}",
+        found=found,
+        record=found.record(),
+        summary=sentences.summary(found),
+        steps=sentences.next_steps(found),
+        parameters=sentences.table(found),
+        errors=sentences.errors(found),
+        figures=drawn,
+    )
+    written["page"] = write_text(out / "report.html", page)
+    return written
+
+
+def write_figures(subject: Any, out: Path) -> Mapping[str, Path]:
+    """One PNG a figure of any subject that has plots."""
+    return {f["name"]: write_bytes(out / f"{f['name']}.png", f["png"]) for f in figures(subject)}

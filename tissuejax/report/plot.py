@@ -1,0 +1,62 @@
+"""What every plot is: data prepared without a picture (tested), and a drawing of nothing but that data."""
+
+import abc
+from typing import Any, ClassVar
+
+import equinox as eqx
+from matplotlib.figure import Figure
+
+INK, FAINT, PAPER = "#22313f", "#8795a1", "#ffffff"
+MODEL, HELD, MEASURED = "#1f6fb2", "#d9730d", "#5b6b7a"
+SERIES = ("#1f6fb2", "#d9730d", "#3a9d5d", "#a64ca6", "#c0392b", "#7a6a2f", "#16838f", "#555555")
+
+
+class Plot(eqx.Module):
+    """One kind of picture of one kind of subject, a file each; found by walking the room.
+
+    Class data:
+        name: file name of the figure, and its key on a page.
+        subject: the class it pictures.
+        order: place on a page.
+    """
+
+    name: ClassVar[str]
+    subject: ClassVar[type]
+    order: ClassVar[int] = 100
+
+    @abc.abstractmethod
+    def prepare(self, subject: Any) -> Any | None:
+        """The numbers to draw, or None where there is nothing to show."""
+
+    @abc.abstractmethod
+    def caption(self, data: Any) -> str:
+        """One or two sentences under the figure: what is seen."""
+
+    @abc.abstractmethod
+    def draw(self, data: Any) -> Figure:
+        """The figure of prepared numbers."""
+
+
+def grid(n: int, columns: int = 3, width: float = 10.0, height: float = 2.7, **options) -> tuple[Figure, list]:
+    """A figure with `n` axes in rows of `columns`; axes are flat."""
+    columns = min(columns, n)
+    rows = -(-n // columns)
+    figure = Figure(figsize=(width, height * rows + 0.3), layout="constrained", facecolor=PAPER)
+    axes = figure.subplots(rows, columns, squeeze=False, **options).ravel().tolist()
+    for spare in axes[n:]:
+        spare.set_visible(False)
+    for ax in axes:
+        tidy(ax)
+    return figure, axes[:n]
+
+
+def tidy(ax) -> None:
+    """The house look of an axis: no box, thin grid, dark text."""
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.spines[["left", "bottom"]].set_color(FAINT)
+    ax.tick_params(colors=INK, labelsize=8, length=3, color=FAINT)
+    ax.grid(color="#e6ebef", linewidth=0.6)
+    ax.set_axisbelow(True)
+    for label in (ax.xaxis.label, ax.yaxis.label, ax.title):
+        label.set_color(INK)
+        label.set_fontsize(9)

@@ -1,0 +1,49 @@
+"""What the model leaves over, in units of the noise: structure here is physics (or a rig) that is missing."""
+
+from typing import ClassVar
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tissuejax.fitting.result import Fit
+from tissuejax.report.fit_overlay import DENSE, MOST
+from tissuejax.report.plot import HELD, INK, MODEL, Plot, grid
+from tissuejax.report.series import Curve, curves
+
+
+class Residuals(Plot):
+    """(predicted - measured) / noise over time, with the band that noise alone would fill."""
+
+    name: ClassVar[str] = "residuals"
+    subject: ClassVar[type] = Fit
+    order: ClassVar[int] = 20
+
+    def prepare(self, subject: Fit) -> list[tuple[Curve, np.ndarray]]:
+        """Curve and normalised residual of each series that has a noise level."""
+        usable = [c for c in curves(subject) if c.predicted is not None and c.std]
+        inside, held = [c for c in usable if not c.held], [c for c in usable if c.held]
+        shown = inside[: MOST - min(len(held), MOST // 2)] + held[: MOST // 2]
+        return [(c, (c.predicted - c.measured) / c.std) for c in shown] or None
+
+    def caption(self, data: list[tuple[Curve, np.ndarray]]) -> str:
+        """How to read it."""
+        return (
+            "Residuals in units of the noise. Noise alone scatters evenly, 95 % of it inside the grey band; "
+            "waves, drifts "
+            "and steps are systematic."
+        )
+
+    def draw(self, data: list[tuple[Curve, np.ndarray]]) -> Figure:
+        """Against stretch, shear or time as in the overlay."""
+        figure, axes = grid(len(data), height=2.2)
+        for ax, (curve, r) in zip(axes, data, strict=True):
+            by_time = curve.drive is None or curve.held_still
+            x = curve.time if by_time else curve.drive
+            thin = slice(None, None, max(1, len(x) // DENSE))
+            ax.axhspan(-1.96, 1.96, color="#e9edf0", zorder=0)
+            ax.axhline(0, color=INK, linewidth=0.6)
+            ax.plot(x[thin], r[thin], ".", color=HELD if curve.held else MODEL, markersize=3)
+            ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontweight="bold")
+            ax.set_xlabel("time (s)" if by_time else curve.drive_name)
+            ax.set_ylabel(f"{curve.channel.replace('_', ' ')}\nresidual / noise")
+        return figure

@@ -1,0 +1,44 @@
+"""How the misfit fell from step to step, and where each start ended."""
+
+from typing import ClassVar
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tissuejax.fitting.result import Fit
+from tissuejax.report.plot import FAINT, MODEL, Plot, grid
+
+
+class Trace(Plot):
+    """Chi-square of accepted steps, and of the ends of all starts."""
+
+    name: ClassVar[str] = "trace"
+    subject: ClassVar[type] = Fit
+    order: ClassVar[int] = 90
+
+    def prepare(self, subject: Fit) -> dict[str, np.ndarray] | None:
+        """Steps and ends; None for a fit without a trace."""
+        if not subject.trace:
+            return None
+        return {"steps": np.array([i.chi2 for i in subject.trace]), "ends": np.array(subject.starts, float)}
+
+    def caption(self, data: dict[str, np.ndarray]) -> str:
+        """Counts."""
+        ends = data["ends"][np.isfinite(data["ends"])]
+        same = int(np.sum(ends <= ends.min() * (1 + 1e-3) + 1e-9))
+        return (
+            f"{len(data['steps'])} accepted steps of the best start; {same} of {len(data['ends'])} starts "
+            f"ended at the best fit."
+        )
+
+    def draw(self, data: dict[str, np.ndarray]) -> Figure:
+        """Logarithmic."""
+        figure, (steps, ends) = grid(2, columns=2, height=2.4)
+        steps.semilogy(np.arange(1, len(data["steps"]) + 1), data["steps"], ".-", color=MODEL)
+        steps.set_xlabel("accepted step")
+        steps.set_ylabel("chi-square")
+        order = np.sort(data["ends"])
+        ends.semilogy(np.arange(1, len(order) + 1), order, "o", color=MODEL, markerfacecolor=FAINT)
+        ends.set_xlabel("start, sorted")
+        ends.set_ylabel("chi-square at its end")
+        return figure

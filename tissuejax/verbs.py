@@ -1,0 +1,144 @@
+"""The verbs of the front door: what the command line does, in Python.
+
+import tissuejax as tj
+found = tj.fit("liver.h5", energy="reduced-polynomial-2", holdout=["r3"])
+tj.write(found, "out")
+
+Importing this module switches JAX to double precision, which fits need; a simulation can ask for single precision
+itself.
+"""
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import jax
+
+from tissuejax.energies import catalogue as names
+from tissuejax.energies.energy import Energy
+from tissuejax.experiments.predictor import predictor
+from tissuejax.fitting.least_squares import fit as fit_problem
+from tissuejax.fitting.result import Fit
+from tissuejax.fitting.setup import problem, split
+from tissuejax.model import Model
+from tissuejax.progress import Progress, Silent
+from tissuejax.recordings.files import read
+from tissuejax.recordings.recording import Sample
+
+jax.config.update("jax_enable_x64", True)
+
+__all__ = ["catalogue", "fit", "material", "read", "sensitivity", "write"]
+
+
+def catalogue() -> dict[str, type[Energy]]:
+    """The catalogue: all strain energies by name."""
+    return names.energies()
+
+
+def material(
+    energy: str | Energy,
+    *,
+    ogden_form: str | None = None,
+    volumetric: str | None = None,
+    effects: Sequence[str] = (),
+) -> Model:
+    """A Model from names.
+
+    Args:
+        energy: e.g. "reduced-polynomial-2", "ogden-3", "demiray+fibre".
+        ogden_form: for "ogden-N" only: which form the constants mean.
+        volumetric: e.g. "quadratic"; None is incompressible.
+        effects: names of effects to switch on.
+    """
+    if not isinstance(energy, Energy):
+        energy = names.energy(energy, ogden_form=ogden_form)
+    bulk = names.volumetric(volumetric) if volumetric else None
+    if effects:
+        from tissuejax.effects.catalogue import effect
+
+        return Model(energy, bulk, tuple(effect(name) for name in effects))
+    return Model(energy, bulk)
+
+
+def fit(
+    data: str | os.PathLike | Sample,
+    energy: str | Energy | Model,
+    *,
+    ogden_form: str | None = None,
+    volumetric: str | None = None,
+    effects: Sequence[str] = (),
+    only: Sequence[str] = (),
+    holdout: Sequence[str] = (),
+    free: Sequence[str] | None = None,
+    fix: Mapping[str, float] | None = None,
+    start: Mapping[str, float] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+    weights: str | Mapping[str, float] = "auto",
+    channels: Sequence[str] = (),
+    loss: str = "squares",
+    method: str = "levenberg-marquardt",
+    multistart: int = 4,
+    seed: int = 0,
+    max_steps: int = 200,
+    progress: Progress | None = None,
+) -> Fit:
+    """Estimate the parameters of a strain energy (and effects) from the recordings of a sample.
+
+    Args:
+        data: a recording file (HDF5), a side file (TOML) of tables, or a Sample.
+        energy: a name, an Energy or a whole Model; see `material` for ogden_form, volumetric, effects.
+        only, holdout: recordings to fit, and to predict only.
+        free, fix, start, bounds, priors: by dotted path, SI; see `fitting.setup.problem`.
+        weights, channels, loss: what a unit of misfit means.
+        method: "levenberg-marquardt", "adam" or "lbfgs".
+        multistart, seed: number of starts and seed of those after the first.
+        max_steps: evaluations for each start.
+        progress: told after every accepted step.
+
+    Returns:
+        The fit: `values`, `std`, `channels`, `holdout`, `warnings`, `record()`.
+
+    Raises:
+        InputError: anything that can't be used as it is, with what to do.
+    """
+    sample = data if isinstance(data, Sample) else read(Path(data))
+    if not isinstance(energy, Model):
+        energy = material(energy, ogden_form=ogden_form, volumetric=volumetric, effects=effects)
+    fitted, held = split(sample, tuple(only), tuple(holdout))
+    posed = problem(
+        predictor(energy, sample, fitted),
+        free=tuple(free) if free is not None else None,
+        fix=fix,
+        start=start,
+        bounds=bounds,
+        priors=priors,
+        weights=weights,
+        channels=tuple(channels),
+        loss=loss,
+    )
+    with (progress or Silent()).stage(f"fitting {energy.energy.name} to {sample.name}", None) as stage:
+        return fit_problem(
+            posed,
+            start=dict(posed.start) if start else None,
+            multistart=multistart,
+            method=method,
+            holdout=held,
+            seed=seed,
+            max_steps=max_steps,
+            on_accept=lambda n, chi2, values: stage.advance(note=f"chi-square {chi2:.4g}"),
+        )
+
+
+def write(found: Fit, out: str | os.PathLike) -> dict[str, Path]:
+    """Write result.json, report.html and figures of a fit into a folder; returns their paths by name."""
+    from tissuejax.report.page import write_fit
+
+    return write_fit(found, Path(out))
+
+
+def sensitivity(found: Fit, **options):
+    """What each parameter does to each channel, and what the data can tell apart; see `fitting.sensitivity.local`."""
+    from tissuejax.fitting.sensitivity import local
+
+    return local(found.problem.predictor, found.values, found.free, found.problem.noise, **options)
