@@ -5,6 +5,7 @@ A name is a member of the family, with its order where it has one: `neo-hookean`
 """
 
 import re
+from typing import NamedTuple
 
 from tissuejax import energies as package
 from tissuejax.energies.energy import Energy
@@ -12,6 +13,7 @@ from tissuejax.energies.ogden import form
 from tissuejax.energies.volumetric import Volumetric
 from tissuejax.errors import InputError, unknown
 from tissuejax.families import members
+from tissuejax.parameters import Parameter
 
 ALIASES = {"yeoh": "reduced-polynomial-3"}
 
@@ -55,6 +57,38 @@ def volumetric(name: str) -> Volumetric:
     return _of(volumetrics(), "volumetric energy", "compressibility-1" if name == "compressibility" else name)
 
 
+class Entry(NamedTuple):
+    """One line of the catalogue, in words."""
+
+    name: str
+    formula: str
+    parameters: tuple[Parameter, ...]
+    shear_modulus: str
+    valid: str
+    source: str
+
+
+def entries() -> dict[str, Entry]:
+    """The catalogue as `tissuejax energies` shows it: every energy and addition, under the name to type."""
+    lines = {}
+    for name, example in examples().items():
+        if "+" in name:
+            typed, declared = example.name, example.parameters[len(example.matrix.parameters) :]
+        else:
+            typed, declared = re.sub(r"-\d+$", "-N", name), example.parameters
+        lines[typed] = Entry(typed, example.formula, declared, example.shear_modulus, example.valid, example.source)
+    return lines
+
+
+def examples(ogden_form: str = "2mu/alpha^2", order: int = 2) -> dict[str, Energy]:
+    """One of each energy, and the neo-Hookean one with each addition, by name: for tables, plots and test batteries."""
+    found = {}
+    for name, kind in members(package, Energy).items():
+        typed = f"neo-hookean{name}" if name.startswith("+") else f"{name}-{order}" if _ordered(kind) else name
+        found[typed] = energy(typed, ogden_form if name == "ogden" else None)
+    return found
+
+
 def name_of(energy: Energy | Volumetric) -> str:
     """The name under which the catalogue gives this energy, e.g. "ogden-3+fibre"."""
     if hasattr(energy, "matrix"):
@@ -75,9 +109,13 @@ def _of(found: dict[str, type], kind: str, name: str, **options):
     if stem not in found:
         raise unknown(kind, name, [*found, *(ALIASES if kind == "energy" else ())])
     cls = found[stem]
-    ordered = "order" in getattr(cls, "__dataclass_fields__", {})
+    ordered = _ordered(cls)
     if ordered and not order:
         raise InputError(f"{kind} {name!r} needs its order, 1 or more: write {stem}-2 for order 2")
     if order is not None and not ordered:
         raise InputError(f"{kind} {name!r}: {stem!r} has no order; write {stem!r}")
     return cls(**options, **({"order": order} if ordered else {}))
+
+
+def _ordered(kind: type) -> bool:
+    return "order" in getattr(kind, "__dataclass_fields__", {})

@@ -15,7 +15,7 @@ class Humphrey(Energy):
     """psi = C1 (exp(C2 (I1bar - 3)) - 1).
 
     Shear modulus at rest 2 C1 C2. The same function as Demiray's with mu = 2 C1 C2 and b = C2; published numbers
-    come in both. Their fibre part is `humphrey+fibre`. Source: Humphrey and Yin 1987, Biophys. J. 52; Martins et al. 2006.
+    come in both. With fibres: `humphrey+fibre`. Source: Humphrey and Yin 1987, Biophys. J. 52.
     """
 
     name: ClassVar[str] = "humphrey"
