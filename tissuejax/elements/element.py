@@ -54,10 +54,11 @@ class Element(eqx.Module):
         """Nodal forces of the first Piola-Kirchhoff stress P (Pa) and of hourglass stiffness (Pa)."""
 
     @abc.abstractmethod
-    def steepness(self, reference: Any) -> Float[Array, " E"]:
-        """Largest eigenvalue of sum_a B_a B_a^T times the number of nodes, 1/m^2.
+    def steepness(self, reference: Any, hourglass: float) -> Float[Array, " E"]:
+        """Largest eigenvalue of sum_a B_a B_a^T times the number of nodes, 1/m^2, or that of the hourglass modes.
 
-        With wave speed c the highest frequency of an element obeys omega^2 <= c^2 * steepness.
+        With wave speed c the highest frequency of an element obeys omega^2 <= c^2 * steepness. `hourglass`: stiffness
+        of the hourglass control over that of the waves (rho c^2).
         """
 
 

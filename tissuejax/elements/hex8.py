@@ -22,7 +22,7 @@ SIGNS = np.array(
 
 class Reference(NamedTuple):
     """`gradient`: (dxi_k/dX_J)/8, 9 arrays; `hourglass`: h_alpha . X_J, 12 arrays; `stiffening`: 1/64 of the
-    hourglass stiffness per modulus, m; `volume`, m^3."""
+    hourglass stiffness per modulus, 8 V sum_a |B_a|^2, m; `volume`, m^3."""
 
     gradient: tuple[Float[Array, " E"], ...]
     hourglass: tuple[Float[Array, " E"], ...]
@@ -73,8 +73,8 @@ class Hex8(Element):
         volume = 8 * determinant(jacobian)
         gradient = tuple(g / 8 for g in inverse(jacobian))  # by rows: k, then J
         hourglass = tuple(m[i][3 + a] for a in range(4) for i in range(3))
-        squares = sum(8 * g * g for g in gradient)  # sum_a |grad N_a|^2 = 1.5/h^2 in a cube
-        return Reference(gradient, hourglass, volume * squares * (8 / 9) / 64, volume)
+        squares = sum(8 * g * g for g in gradient)  # sum_a |grad N_a|^2, 1.5/h^2 in a cube
+        return Reference(gradient, hourglass, 8 * volume * squares / 64, volume)
 
     def gradient(self, reference: Reference, u: Float[Array, "3 8 E"]) -> tuple[Tensor9, Any]:
         A, X = reference.gradient, reference.hourglass
@@ -94,13 +94,14 @@ class Hex8(Element):
             h = [kappa * memory[4 * i + a] for a in range(4)]
             T = [V * P[3 * i + J] - sum(X[3 * a + J] * h[a] for a in range(4)) for J in range(3)]
             g = [sum(T[J] * A[3 * k + J] for J in range(3)) for k in range(3)]
-            rows.append(nodal(*g, *h))
-        return rows
+            rows.append(jnp.stack(nodal(*g, *h)))
+        return jnp.stack(rows)
 
-    def steepness(self, reference: Reference) -> Float[Array, " E"]:
+    def steepness(self, reference: Reference, hourglass: float) -> Float[Array, " E"]:
         A = reference.gradient
 
         def product(I, J):
             return 64 * sum(A[3 * k + I] * A[3 * k + J] for k in range(3))  # nodes * sum_a B_aI B_aJ
 
-        return largest_eigenvalue(*(product(*ij) for ij in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))))
+        waves = largest_eigenvalue(*(product(*ij) for ij in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))))
+        return jnp.maximum(waves, hourglass * 64 * sum(g * g for g in A))

@@ -211,7 +211,11 @@ class Scene(eqx.Module):
 
     def cast(self, dtype: Any) -> "Scene":
         """All floating-point leaves in one precision."""
-        return jax.tree.map(lambda x: jnp.asarray(x, dtype) if eqx.is_inexact_array_like(x) else x, self)
+
+        def one(x):
+            return jnp.asarray(x, dtype) if jnp.issubdtype(jnp.result_type(x), jnp.inexact) else x
+
+        return jax.tree.map(one, self)
 
 
 def _put(part, keys, value, path):

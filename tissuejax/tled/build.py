@@ -1,0 +1,234 @@
+"""From a mesh, a material and a probe path to a `Scene`: the choices that are made once, on the host, with their reasons.
+
+Step: `SAFETY` times the critical step at the given parameters (give the stiffest ones that a fit may visit). Penalty:
+`GRIP` times the wave modulus over the facet size, which keeps penetration near a thousandth of the probe's radius.
+Patch: facets that the probe can come near. What can't work is refused here, once, with a sentence.
+"""
+
+import math
+from collections.abc import Mapping
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from tissuejax import elements
+from tissuejax.energies.energy import Energy
+from tissuejax.energies.volumetric import Volumetric
+from tissuejax.errors import InputError
+from tissuejax.families import lookup, members
+from tissuejax.mesh.facets import area_vectors, boundary
+from tissuejax.mesh.quality import refuse_bad
+from tissuejax.recordings.recording import Geometry
+from tissuejax.tled.contact import quadrature
+from tissuejax.tled.scene import Body, Clock, Markers, Probe, Scene, Settings, Support, Tissue
+from tissuejax.tled.shapes import Hemisphere, Platen, Shape, Sphere
+from tissuejax.tled.stable import critical_steps, wave_modulus
+
+SAFETY = 0.7
+GRIP = 40.0
+PATCH = 16  # patches are padded to a multiple of this, so that scenes of one mesh share a program
+
+
+def element(cell_type: str):
+    """The element for a meshio cell type.
+
+    Raises:
+        InputError: no such element; the known ones are offered.
+    """
+    from tissuejax.elements.element import Element
+
+    return lookup("element", cell_type, members(elements, Element))()
+
+
+def scene(
+    geometry: Geometry,
+    energy: Energy,
+    volumetric: Volumetric,
+    energy_values: Mapping[str, float],
+    volumetric_values: Mapping[str, float],
+    density: float,
+    times: Float[np.ndarray, " n"],
+    probe_time: Float[np.ndarray, " m"] | None = None,
+    probe_position: Float[np.ndarray, "m 3"] | None = None,
+    radius: float | None = None,
+    shape: Shape | None = None,
+    compression: float = 1.0,
+    step: float | None = None,
+    penalty: float | None = None,
+    hourglass: float = 0.3,
+    mass_damping: float | None = None,
+    stiffness_damping: float = 0.0,
+    gravity: tuple[float, float, float] | None = None,
+    markers: Markers | None = None,
+    held: Float[np.ndarray, "F 3"] | None = None,
+    patch: Float[np.ndarray, "P v"] | None = None,
+    softness: float | None = None,
+) -> Scene:
+    """A scene with every optional slot empty.
+
+    Args:
+        geometry: stress-free mesh (m), support nodes in `fixed`.
+        energy, volumetric, energy_values, volumetric_values: material; values by their own names (`C10`, `K`).
+        density: kg/m^3.
+        times: uniform output times (middles of the frames), real time, s.
+        probe_time, probe_position, radius or shape: the probe; None for none.
+        compression: factor f by which slow motion is run faster.
+        step: s on the simulated clock; None is `SAFETY` times the critical one.
+        penalty: Pa/m; None is automatic. softness: m; None is a thousandth of the radius.
+        hourglass: in units of the shear modulus (0.1 to 0.5).
+        mass_damping: 1/s; None is half the lowest shear frequency pi/2 c_s / height.
+        stiffness_damping: beta, s; 5e-5 s for forward tangents of slow runs.
+        gravity: m/s^2. markers: points to follow. held: which axes of the fixed nodes are held (all).
+        patch: nodes of the facets that may touch (automatic).
+
+    Raises:
+        InputError: a bad mesh, a step above the critical one, a probe that starts inside the tissue or never comes
+            near, output times that are not uniform, a missing radius, values that are not positive.
+    """
+    refuse_bad(geometry)
+    times = np.asarray(times, float)
+    interval = _interval(times)
+    if not density > 0:
+        raise InputError(f"density {density} kg/m^3: mass is needed by the explicit solver; tissue has about 1000")
+    facets = boundary(geometry.cells, geometry.cell_type)
+    body = Body(
+        jnp.asarray(geometry.points), jnp.asarray(geometry.cells, jnp.int32), jnp.asarray(geometry.fixed, jnp.int32),
+        jnp.ones((len(geometry.fixed), 3)) if held is None else jnp.asarray(held, float),
+        jnp.asarray(facets.nodes, jnp.int32), element(geometry.cell_type),
+    )  # fmt: skip
+    tissue = Tissue(energy, volumetric, _floats(energy_values), _floats(volumetric_values), jnp.asarray(float(density)))
+    if mass_damping is None:
+        height = float(np.ptp(np.asarray(geometry.points)[:, 2]))
+        speed = math.sqrt(float(energy.initial_shear_modulus(tissue.energy_values)) / density)
+        mass_damping = 0.5 * (math.pi / 2) * speed / height
+    settings = Settings(*(jnp.asarray(float(x)) for x in (hourglass, mass_damping, stiffness_damping)))
+    clock = Clock(*(jnp.asarray(float(x)) for x in (times[0] - interval / 2, interval, compression)), len(times), 1)
+    g = None if gravity is None else jnp.asarray(gravity, float)
+    bare = Scene(body, tissue, clock, settings, Support(), None, markers, g)
+    bare = bare.put({"clock.steps": steps(bare, step)})
+    if probe_position is None:
+        return bare
+    shape = _shape(shape, radius)
+    facets = _patch(facets.nodes, geometry, shape, probe_time, probe_position) if patch is None else np.asarray(patch)
+    return bare.put({"probe": probe(bare, shape, probe_time, probe_position, facets, penalty, softness)})
+
+
+def steps(bare: Scene, step: float | None) -> int:
+    """Steps a frame: the given step, or the greatest that is safe.
+
+    Raises:
+        InputError: a step above the critical one.
+    """
+    bounds = np.asarray(critical_steps(bare))
+    critical = float(bounds.min())
+    if step is not None and step > critical:
+        raise InputError(
+            f"step {step * 1e3:.4g} ms: the critical step is {critical * 1e3:.4g} ms (element {int(bounds.argmin())}); "
+            "take a smaller step, less stiffness damping, or leave it to the program"
+        )
+    step = SAFETY * critical if step is None else step
+    return max(1, math.ceil(float(bare.clock.interval / bare.clock.compression) / step - 1e-9))
+
+
+def probe(bare: Scene, shape: Shape, time, position, facets, penalty=None, softness=None) -> Probe:
+    """The probe over its contact patch, with penalty, softness and the static mass of the patch chosen."""
+    time, position = np.asarray(time, float), np.asarray(position, float)
+    points = np.asarray(bare.body.points)
+    size = math.sqrt(np.linalg.norm(area_vectors(points, facets), axis=1).mean())
+    if penalty is None:
+        penalty = GRIP * float(wave_modulus(bare)) / size
+    if softness is None:
+        reach = float(shape.reach())
+        softness = 1e-3 * (reach if math.isfinite(reach) else size)
+    area = _areas(points, facets)
+    weights, _ = quadrature(facets.shape[1])
+    nodal = np.zeros(len(points))
+    np.add.at(nodal, facets.T, np.einsum("qv,qp->vp", weights, area))
+    mass = penalty * nodal * float(bare.clock.step) ** 2 / 4
+    spare = -len(facets) % PATCH
+    facets = np.concatenate([facets, np.repeat(facets[-1:], spare, 0)])
+    area = np.concatenate([area, np.zeros((len(area), spare))], 1)
+    made = Probe(
+        jnp.asarray(time), jnp.asarray(position), shape, jnp.asarray(facets, jnp.int32), jnp.asarray(area),
+        jnp.asarray(mass), jnp.asarray(float(penalty)), jnp.asarray(float(softness)),
+    )  # fmt: skip
+    _refuse_inside(made, points, float(bare.clock.start))
+    return made
+
+
+def _floats(values: Mapping[str, float]) -> dict[str, Array]:
+    return {name: jnp.asarray(value, float) for name, value in values.items()}
+
+
+def _interval(times):
+    gaps = np.diff(times)
+    if len(times) < 2 or not (gaps > 0).all() or np.ptp(gaps) > 1e-3 * gaps.mean():
+        raise InputError(
+            f"output times: {len(times)} values with gaps from {gaps.min() if len(gaps) else 0:.3g} to "
+            f"{gaps.max() if len(gaps) else 0:.3g} s; at least two uniform, increasing times are needed (take a uniform "
+            "grid and `sample` the result at the sensor's own times)"
+        )
+    return (times[-1] - times[0]) / (len(times) - 1)
+
+
+def _shape(shape, radius):
+    if shape is not None:
+        return shape
+    if radius is None or not radius > 0:
+        raise InputError(f"probe radius {radius}: a spherical tip needs its radius in m, for example 0.00475")
+    return Sphere(jnp.asarray(float(radius)))
+
+
+def _distance(shape, x):
+    gap, _ = shape.distance(tuple(jnp.asarray(x[..., i]) for i in range(3)))
+    return np.asarray(gap)
+
+
+def _patch(nodes, geometry, shape, time, position):
+    """Facets some node of which comes within half a radius and a facet of the probe's path."""
+    points = np.asarray(geometry.points)
+    free = ~np.isin(nodes, geometry.fixed).all(1)
+    vectors = area_vectors(points, nodes)
+    if isinstance(shape, Platen):
+        keep = free & (vectors[:, 2] > 0.2 * np.linalg.norm(vectors, axis=1))
+        return nodes[keep]
+    size = math.sqrt(np.linalg.norm(vectors, axis=1).mean())
+    some = np.asarray(position)[:: max(1, len(position) // 200)]
+    some = np.concatenate([some, np.asarray(position)[np.argmin(np.asarray(position)[:, 2])][None]])
+    nearest = np.min([_distance(shape, points - c) for c in some], axis=0)
+    keep = free & (nearest[nodes].min(1) < 0.5 * float(shape.reach()) + size)
+    if not keep.any():
+        raise InputError(
+            f"the probe stays {1e3 * nearest.min():.1f} mm or more off the tissue; check frame, units and registration"
+        )
+    return nodes[keep]
+
+
+def _areas(points, facets):
+    """Reference area of each contact point, (q, P)."""
+    shape, weight = quadrature(facets.shape[1])
+    x = points[facets]
+    if facets.shape[1] == 3:
+        return weight[:, None] * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
+    place = np.polynomial.legendre.leggauss(3)[0]
+    a, b = (g.ravel() for g in np.meshgrid(place, place))
+    da = np.stack([-(1 - b), 1 - b, 1 + b, -(1 + b)], -1) / 4
+    db = np.stack([-(1 - a), -(1 + a), 1 + a, 1 - a], -1) / 4
+    normal = np.cross(np.einsum("qv,pvi->qpi", da, x), np.einsum("qv,pvi->qpi", db, x))
+    return weight[:, None] * np.linalg.norm(normal, axis=-1)
+
+
+def _refuse_inside(made: Probe, points, start):
+    position = np.array([np.interp(start, made.time, made.position[:, i]) for i in range(3)])
+    weights, _ = quadrature(made.patch.shape[1])
+    x = np.einsum("qv,pvi->qpi", weights, points[np.asarray(made.patch)])
+    deep = -_distance(made.shape, x - position).min()
+    if deep > 20 * float(made.softness):
+        raise InputError(
+            f"the probe starts {1e3 * deep:.2f} mm inside the tissue at t = {start:.4g} s; start the path out of contact "
+            "or check mesh, offset and units"
+        )
+
+
+__all__ = ["Hemisphere", "Platen", "Sphere", "scene", "element", "probe", "steps"]

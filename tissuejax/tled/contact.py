@@ -1,0 +1,144 @@
+"""Contact of a rigid probe at quadrature points of the surface facets: penalty, friction, adhesion.
+
+Contact at the nodes drives the hourglass modes of one-point elements and loses up to half the force, so pressure acts
+at 3 x 3 Gauss points of each quadrilateral (six points of a triangle), over reference areas. The pressure is
+p = penalty * softness * softplus(-gap / softness). Friction is Coulomb's law made regular by a tangential spring of the
+same stiffness: a point sticks until the spring carries mu p, then it slides. Adhesion pulls at points that have
+touched, sigma (gap/reach) exp(1 - gap/reach), until the gap is five times `reach`.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from tissuejax.tled.internal import barrier
+from tissuejax.tled.scene import Probe, Scene
+
+BREAK = 5.0  # gap over reach at which a bond is gone: exp(1 - 5) * 5 = 9 % of the greatest pull
+
+
+def quadrature(corners: int) -> tuple[np.ndarray, np.ndarray]:
+    """Shape functions (q, corners) and weights (q,) of the contact points of a facet, weights on the reference facet.
+
+    Quadrilaterals: 3 x 3 Gauss points over [-1, 1]^2. Triangles: six points of degree 4 (Dunavant 1985), sum 1/2.
+    """
+    if corners == 4:
+        place, weight = np.polynomial.legendre.leggauss(3)
+        a, b = (g.ravel() for g in np.meshgrid(place, place))
+        shape = np.stack([(1 - a) * (1 - b), (1 + a) * (1 - b), (1 + a) * (1 + b), (1 - a) * (1 + b)], -1) / 4
+        return shape, np.outer(weight, weight).ravel()
+    one, two = 0.445948490915965, 0.091576213509771
+    bary = [np.roll([1 - 2 * x, x, x], i) for x in (one, two) for i in range(3)]
+    return np.array(bary), np.repeat([0.111690794839005, 0.054975871827661], 3)
+
+
+class Grip(NamedTuple):
+    """What contact remembers at each point: where it sticks (three arrays, or None), whether it is bonded (or None)."""
+
+    anchor: tuple[Float[Array, "q P"], ...] | None
+    bond: Float[Array, "q P"] | None
+
+
+class Patch(NamedTuple):
+    """Reference positions of the patch's nodes, (3, v, P), and their numbers, (v, P)."""
+
+    x: Float[Array, "3 v P"]
+    nodes: Int[Array, "v P"]
+
+
+def patch(scene: Scene) -> Patch:
+    """The facets of the scene's contact patch."""
+    nodes = scene.probe.patch.T
+    return Patch(scene.body.points.T.at[:, nodes].get(mode="promise_in_bounds"), nodes)
+
+
+def untouched(probe: Probe) -> Grip:
+    """Memory before the first contact."""
+    zero = jnp.zeros_like(probe.area)
+    return Grip(None if probe.friction is None else (zero, zero, zero), None if probe.adhesion is None else zero)
+
+
+class Touch(NamedTuple):
+    """Result of `forces`: `nodal` (3, N) on the tissue, `force` and `torque` on the probe, and the memory."""
+
+    nodal: Float[Array, "3 N"]
+    force: Float[Array, " 3"]
+    torque: Float[Array, " 3"]
+    grip: Grip
+
+
+def places(patch: Patch, u: Float[Array, "3 N"], centre: Float[Array, " 3"], shape: np.ndarray):
+    """Contact points relative to the probe's reference point, three arrays (q, P)."""
+    x = patch.x + u.at[:, patch.nodes].get(mode="promise_in_bounds")
+    corners = shape.shape[1]
+    weights = [jnp.asarray(shape[:, a : a + 1], x.dtype) for a in range(corners)]
+    return tuple(sum(weights[a] * x[i, a] for a in range(corners)) - centre[i] for i in range(3))
+
+
+def _softplus(z):
+    return jnp.maximum(z, 0.0) + jnp.log1p(jnp.exp(-jnp.abs(z)))
+
+
+def forces(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Array, " 3"], grip: Grip) -> Touch:
+    """Contact forces with the probe's reference point at `centre`."""
+    shape, _ = quadrature(patch.nodes.shape[0])
+    x = barrier(places(patch, u, centre, shape))
+    gap, normal = probe.shape.distance(x)
+    pressure = probe.penalty * probe.softness * _softplus(-gap / probe.softness)
+    push, bond = pressure, grip.bond
+    if probe.adhesion is not None:
+        touched = jax.nn.sigmoid(-gap / probe.softness)
+        bond = jnp.where(gap > BREAK * probe.reach, 0.0, jnp.maximum(bond, touched))
+        opening = jnp.maximum(gap, 0.0) / probe.reach
+        push = pressure - probe.adhesion * bond * opening * jnp.exp(1.0 - opening)
+    traction, anchor = tuple(push * n for n in normal), grip.anchor  # on the tissue: away from the probe
+    if probe.friction is not None:
+        drag, anchor = _friction(probe, x, normal, pressure, anchor)
+        traction = tuple(t + d for t, d in zip(traction, drag, strict=True))
+    f = barrier(tuple(t * probe.area for t in traction))
+    total = jnp.stack([jnp.sum(c) for c in f])
+    torque = jnp.stack([jnp.sum(x[(i + 1) % 3] * f[(i + 2) % 3] - x[(i + 2) % 3] * f[(i + 1) % 3]) for i in range(3)])
+    at_nodes = jnp.stack([jnp.stack([_spread(shape[:, a], c) for a in range(shape.shape[1])]) for c in f])
+    nodal = jnp.zeros_like(u).at[:, patch.nodes].add(at_nodes, mode="promise_in_bounds")
+    return Touch(nodal, -total, -torque, Grip(anchor, bond))
+
+
+def _spread(weights, f):
+    return sum(float(w) * f[q] for q, w in enumerate(weights))
+
+
+def _friction(probe, x, normal, pressure, anchor):
+    """Traction of the tangential springs after sliding, and where they are anchored now (relative to the probe)."""
+    stretch = tuple(a - b for a, b in zip(x, anchor, strict=True))
+    along = sum(s * n for s, n in zip(stretch, normal, strict=True))
+    stretch = tuple(s - along * n for s, n in zip(stretch, normal, strict=True))
+    square = sum(s * s for s in stretch)
+    some = square > 0
+    length = jnp.sqrt(jnp.where(some, square, 1.0))
+    limit = probe.friction * pressure / probe.penalty
+    kept = jnp.where(some, jnp.minimum(1.0, limit / length), 1.0)
+    kept_stretch = tuple(kept * s for s in stretch)
+    anchor = tuple(a - s for a, s in zip(x, kept_stretch, strict=True))
+    return tuple(-probe.penalty * s for s in kept_stretch), anchor
+
+
+def depth(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Array, " 3"]) -> Float[Array, ""]:
+    """Greatest penetration of a contact point into the probe, m; negative where nothing touches."""
+    shape, _ = quadrature(patch.nodes.shape[0])
+    gap, _ = probe.shape.distance(places(patch, u, centre, shape))
+    return jnp.max(jnp.where(probe.area > 0, -gap, -jnp.inf))
+
+
+def energy(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Array, " 3"]) -> Float[Array, ""]:
+    """Energy stored in the normal penalty, J: the integral of the pressure over the approach."""
+    shape, _ = quadrature(patch.nodes.shape[0])
+    gap, _ = probe.shape.distance(places(patch, u, centre, shape))
+    z = -gap / probe.softness
+    # integral of softplus is -Li2(-exp(z)); with Li2's reflection for z > 0 only small arguments remain
+    small = jnp.exp(-jnp.abs(z))
+    series = sum((-1) ** (k + 1) * small**k / k**2 for k in range(1, 40))
+    integral = jnp.where(z > 0, z * z / 2 + jnp.pi**2 / 6 - series, series)
+    return jnp.sum(probe.area * probe.penalty * probe.softness**2 * integral)

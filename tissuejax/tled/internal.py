@@ -1,0 +1,214 @@
+"""Internal forces of the tissue: gather, deformation gradient, stress as gradient of the energy, forces, assembly.
+
+The stages are kept apart by optimisation barriers: XLA on CPU would otherwise copy strain and stress into each of the
+24 force outputs and compute them again there (3 to 5 times slower). Barriers survive only if a program is compiled
+with `simulate.COMPILER_OPTIONS`; without them the result is the same and slower.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int
+
+from tissuejax.elements.element import cofactor, determinant
+from tissuejax.energies.strain import Strain
+from tissuejax.tensors import Sym
+from tissuejax.tled.history import relax
+from tissuejax.tled.scene import Scene
+
+barrier = jax.lax.optimization_barrier
+BLOCK = 64  # elements are padded to whole vectors and cache lines: an odd number costs up to half as much again
+
+
+class Mesh(NamedTuple):
+    """What is computed once a run from the stress-free shape.
+
+    `cells` (k, E') and `reference` are padded with elements without volume; `mass` (N,) is lumped, kg.
+    """
+
+    cells: Int[Array, "k E"]
+    reference: Any
+    stiffness: Float[Array, " E"]
+    mass: Float[Array, " N"]
+    nodal_volume: Float[Array, " N"] | None
+
+
+class History(NamedTuple):
+    """What the material remembers; None where the scene has no such memory."""
+
+    relaxed: list | None
+    greatest: Float[Array, " E"] | None
+
+
+def mesh(scene: Scene) -> Mesh:
+    """Reference quantities; differentiable in points, density and stiffness."""
+    body, tissue = scene.body, scene.tissue
+    count, k = body.cells.shape
+    padding = -count % BLOCK
+    cells = jnp.concatenate([body.cells, jnp.broadcast_to(body.cells[-1:], (padding, k))]).T
+    reference = body.element.reference(take(body.points.T, cells))
+    present = (jnp.arange(count + padding) < count).astype(body.points.dtype)
+    volume = reference.volume * present
+    reference = reference._replace(volume=volume)
+    stiffness = jnp.concatenate([scene.stiffness, jnp.zeros(padding, body.points.dtype)])
+    shares = jnp.broadcast_to(volume / k, (k, len(volume)))
+    nodal_volume = add(shares, cells, len(body.points))
+    averaged = nodal_volume if body.element.averaged_pressure else None
+    return Mesh(cells, reference, stiffness, tissue.density * nodal_volume, averaged)
+
+
+def take(u: Float[Array, "... N"], cells: Int[Array, "k E"]) -> Float[Array, "... k E"]:
+    """Nodal values by element."""
+    return u.at[..., cells].get(mode="promise_in_bounds")
+
+
+def add(f: Float[Array, "... k E"], cells: Int[Array, "k E"], count: int) -> Float[Array, "... N"]:
+    """Element contributions summed at the nodes: the transpose of `take`."""
+    return jnp.zeros((*f.shape[:-2], count), f.dtype).at[..., cells].add(f, mode="promise_in_bounds")
+
+
+def rest(scene: Scene, mesh: Mesh) -> History:
+    """The memory of tissue that has been at rest for ever in its settled shape."""
+    tissue, zero = scene.tissue, jnp.zeros_like(mesh.stiffness)
+    relaxed = greatest = None
+    if tissue.prony is not None or tissue.damage is not None:
+        u = settled(scene)
+        F, _ = scene.body.element.gradient(mesh.reference, take(u, mesh.cells))
+        psi, S = isochoric(scene, mesh, cauchy_green(F))
+        relaxed = None if tissue.prony is None else [tuple(S) for _ in range(len(tissue.prony.g))]
+        greatest = None if tissue.damage is None else jnp.maximum(zero, psi)
+    return History(relaxed, greatest)
+
+
+def settled(scene: Scene) -> Float[Array, "3 N"]:
+    """Displacement at time zero."""
+    body = scene.body
+    return jnp.zeros_like(body.points.T) if body.settled is None else body.settled.T
+
+
+def cauchy_green(F) -> Sym:
+    """C = F^T F."""
+    a, b, c, d, e, f, g, h, i = F
+    return Sym(
+        a * a + d * d + g * g, b * b + e * e + h * h, c * c + f * f + i * i,
+        a * b + d * e + g * h, a * c + d * f + g * i, b * c + e * f + h * i,
+    )  # fmt: skip
+
+
+def first_piola(F, S):
+    """P = F S by components."""
+    xx, yy, zz, xy, xz, yz = S
+    rows = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+    return tuple(sum(F[3 * i + k] * rows[k][j] for k in range(3)) for i in range(3) for j in range(3))
+
+
+def _isochoric_energy(scene: Scene, strain: Strain):
+    psi = scene.tissue.energy.isochoric(scene.tissue.energy_values, strain)
+    for energy in scene.tissue.added:
+        psi = psi + energy(strain)
+    return psi
+
+
+def energy_density(scene: Scene, C: Sym) -> Float[Array, " E"]:
+    """Strain energy by element before the stiffness factor, without memory, Pa."""
+    strain = Strain.of(C)
+    volumetric = scene.tissue.volumetric
+    return _isochoric_energy(scene, strain) + volumetric.energy(scene.tissue.volumetric_values, strain.J)
+
+
+def second_piola(g: Sym) -> tuple:
+    """S = 2 dPsi/dC from the derivative by the six components (off-diagonal ones stand for two)."""
+    return (2 * g.xx, 2 * g.yy, 2 * g.zz, g.xy, g.xz, g.yz)
+
+
+def isochoric(scene: Scene, mesh: Mesh, C: Sym):
+    """Isochoric energy (E,) and second Piola-Kirchhoff stress (six arrays) without memory, stiffness factor included."""
+
+    def total(C):
+        psi = mesh.stiffness * _isochoric_energy(scene, Strain.of(C))
+        return jnp.sum(psi), psi
+
+    g, psi = jax.grad(total, has_aux=True)(C)
+    return psi, second_piola(g)
+
+
+def stress(scene: Scene, mesh: Mesh, C: Sym, history: History, step) -> tuple[tuple, History]:
+    """Second Piola-Kirchhoff stress with memory, and the memory after `step` seconds of real time.
+
+    For elements with averaged pressure the isochoric part only.
+    """
+    tissue, averaged = scene.tissue, scene.body.element.averaged_pressure
+    if tissue.prony is None and tissue.damage is None and not averaged:
+        return second_piola(jax.grad(lambda C: jnp.sum(mesh.stiffness * energy_density(scene, C)))(C)), history
+    psi, S = isochoric(scene, mesh, C)
+    relaxed, greatest = history
+    if tissue.damage is not None:
+        greatest = jnp.maximum(greatest, psi)
+        factor = tissue.damage.factor(greatest / jnp.where(mesh.stiffness > 0, mesh.stiffness, 1.0))
+        S = tuple(factor * s for s in S)
+    if tissue.prony is not None:
+        relaxed, S = relax(tissue.prony, relaxed, S, step)
+    if not averaged:
+        U = _volumetric_gradient(scene, mesh, C)
+        S = tuple(s + p for s, p in zip(S, U, strict=True))
+    return S, History(relaxed, greatest)
+
+
+def _volumetric_gradient(scene, mesh, C):
+    tissue = scene.tissue
+
+    def total(C):
+        return jnp.sum(mesh.stiffness * tissue.volumetric.energy(tissue.volumetric_values, Strain.of(C).J))
+
+    return second_piola(jax.grad(total)(C))
+
+
+def averaged_pressure(scene: Scene, mesh: Mesh, F) -> tuple[Float[Array, " E"], Float[Array, " N"]]:
+    """Element pressure U'(J) from nodally averaged volume ratios (Bonet & Burton 1998), Pa, and U at the nodes.
+
+    J_a = sum V_e J_e / sum V_e over the elements around node a; an element takes the mean of U'(J_a) over its nodes, so
+    the forces are the exact gradient of sum_a V_a U(J_a).
+    """
+    tissue, V, count = scene.tissue, mesh.reference.volume, len(mesh.mass)
+    k = mesh.cells.shape[0]
+
+    def average(x):
+        shares = add(jnp.broadcast_to(V * x / k, (k, len(V))), mesh.cells, count)
+        return shares / mesh.nodal_volume
+
+    Ja, factor = average(determinant(F)), average(mesh.stiffness)
+    U, slope = jax.vjp(lambda J: factor * tissue.volumetric.energy(tissue.volumetric_values, J), Ja)
+    (pressure,) = slope(jnp.ones_like(Ja))
+    return take(pressure, mesh.cells).mean(0), U
+
+
+def forces(scene: Scene, mesh: Mesh, u: Float[Array, "3 N"], history: History, step):
+    """Internal forces (3, N), N, and the memory after `step` seconds of real time.
+
+    Total Lagrangian: f_a = sum_e V_e P . B_a with P = F S (Lister 2012, 4.3.1).
+    """
+    element = scene.body.element
+    shear = scene.settings.hourglass * scene.tissue.energy.initial_shear_modulus(scene.tissue.energy_values)
+    ue = barrier(take(u, mesh.cells))
+    F, memory = barrier(element.gradient(mesh.reference, ue))
+    C = barrier(cauchy_green(F))
+    S, history = barrier(stress(scene, mesh, C, history, step))
+    P = first_piola(F, S)
+    if element.averaged_pressure:
+        p, _ = averaged_pressure(scene, mesh, F)
+        P = tuple(a + p * c for a, c in zip(P, cofactor(F), strict=True))
+    P = barrier(P)
+    fe = element.forces(mesh.reference, P, memory, shear * mesh.stiffness)
+    return barrier(add(barrier(fe), mesh.cells, len(mesh.mass))), history
+
+
+def internal_energy(scene: Scene, mesh: Mesh, u: Float[Array, "3 N"]):
+    """Elastic energy without memory and hourglass part, J, with the volume ratio of each element (E,)."""
+    F, _ = scene.body.element.gradient(mesh.reference, take(u, mesh.cells))
+    J = determinant(F)
+    V = mesh.reference.volume
+    if scene.body.element.averaged_pressure:
+        psi = mesh.stiffness * _isochoric_energy(scene, Strain.of(cauchy_green(F)))
+        return jnp.sum(V * psi) + jnp.sum(mesh.nodal_volume * averaged_pressure(scene, mesh, F)[1]), J
+    return jnp.sum(V * mesh.stiffness * energy_density(scene, cauchy_green(F))), J

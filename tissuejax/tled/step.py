@@ -1,0 +1,126 @@
+"""One explicit step: forces of tissue, skin, contact and gravity, then central differences with mass damping.
+
+In velocity form, v(n+1/2) = ((1 - a h/2) v(n-1/2) + h f/m) / (1 + a h/2), u(n+1) = u(n) + h v(n+1/2) (source 4.3.1;
+Belytschko, Liu & Moran, ch. 6). Contact is evaluated at u(n), tissue at u(n) + beta v(n-1/2).
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from tissuejax.tled import capsule, contact, internal, stable, support
+from tissuejax.tled.internal import barrier
+from tissuejax.tled.scene import Scene
+
+
+class Machine(NamedTuple):
+    """What is worked out once a run from the scene."""
+
+    scene: Scene
+    mesh: internal.Mesh
+    hold: support.Hold
+    patch: contact.Patch | None
+    skin: capsule.Skin | None
+    mass: Float[Array, " N"]
+    weight: Float[Array, "3 N"] | None
+
+
+class State(NamedTuple):
+    """What one step hands to the next: u (3, N) m, v (3, N) m/s half a step behind, memories, the force the machine feels."""
+
+    u: Float[Array, "3 N"]
+    v: Float[Array, "3 N"]
+    history: internal.History
+    grip: contact.Grip | None
+    slip: support.Slip
+    felt: Float[Array, " 3"] | None
+
+
+class Drive(NamedTuple):
+    """Outside motion of one step: the probe at the step's start, how far it moves per step, the support at its end."""
+
+    centre: Float[Array, " 3"] | None
+    stride: Float[Array, " 3"] | None
+    motion: Float[Array, " 3"] | None
+
+
+class Felt(NamedTuple):
+    """What a step reports: force and torque on the probe, force on the support, work done by the probe."""
+
+    force: Float[Array, " 3"]
+    torque: Float[Array, " 3"]
+    reaction: Float[Array, " 3"]
+    work: Float[Array, ""]
+
+
+FEEL = 0.05  # share of the new force per step that a compliant machine answers to: keeps the loop stable
+
+
+def machine(scene: Scene) -> Machine:
+    """Reference quantities of a scene (pure JAX)."""
+    mesh = internal.mesh(scene)
+    probe = scene.probe
+    stiffness = stable.nodal_stiffness(scene, mesh) if support.slips(scene) else None
+    mass = mesh.mass if probe is None else mesh.mass + probe.mass
+    weight = None if scene.gravity is None else scene.gravity[:, None] * mesh.mass
+    skin = None if scene.tissue.capsule is None else capsule.skin(scene.body)
+    patch = None if probe is None else contact.patch(scene)
+    return Machine(scene, mesh, support.hold(scene, stiffness), patch, skin, mass, weight)
+
+
+def start(m: Machine) -> State:
+    """At rest in the settled shape; where that is no equilibrium (gravity switched on), half a step of speed behind."""
+    scene, u = m.scene, internal.settled(m.scene)
+    v = jnp.zeros_like(u)
+    if m.weight is not None and scene.body.settled is None:
+        v = jnp.where(m.hold.held, 0.0, -0.5 * scene.clock.step * m.weight / m.mass)
+    grip = None if scene.probe is None else contact.untouched(scene.probe)
+    compliant = scene.probe is not None and scene.probe.compliance is not None
+    felt = jnp.zeros(3, u.dtype) if compliant else None
+    return State(u, v, internal.rest(scene, m.mesh), grip, support.bonded(scene), felt)
+
+
+def tissue_forces(m: Machine, u: Float[Array, "3 N"], history: internal.History, step):
+    """Internal forces of solid and skin, (3, N), and the new memory. Recomputed, not stored, in a reverse pass."""
+
+    def evaluate(scene, mesh, u, history, step):
+        return internal.forces(scene, mesh, u, history, step)
+
+    f, history = jax.checkpoint(evaluate, prevent_cse=False)(m.scene, m.mesh, u, history, step)
+    if m.skin is not None:
+        f = f + capsule.forces(m.skin, m.scene.tissue.capsule, u)
+    return f, history
+
+
+def advance(m: Machine, state: State, drive: Drive) -> tuple[State, Felt]:
+    """The state one step later."""
+    scene, settings, clock = m.scene, m.scene.settings, m.scene.clock
+    h, real = clock.step, clock.step * clock.compression
+    u, v = state.u, state.v
+    inner, history = tissue_forces(m, u + settings.stiffness_damping * v, state.history, real)
+    outer = jnp.zeros_like(u) if m.weight is None else m.weight + 0.0
+    zero = jnp.zeros(3, u.dtype)
+    force = torque = zero
+    work, grip, felt = zero[0], state.grip, state.felt
+    if scene.probe is not None:
+        centre = drive.centre if felt is None else drive.centre + scene.probe.compliance * felt
+        touch = _touch(scene.probe, m.patch, u, centre, grip)
+        outer, grip = outer + touch.nodal, touch.grip
+        force, torque, work = touch.force, touch.torque, -jnp.sum(touch.force * drive.stride)
+        felt = None if felt is None else felt + FEEL * (force - felt)
+    f = outer - inner
+    half = 0.5 * settings.mass_damping * h
+    pushed = ((1.0 - half) * v + h * f / m.mass) / (1.0 + half)
+    slip = support.slide(scene, m.hold, state.slip, f, real) if support.slips(scene) else state.slip
+    moved = u + h * pushed
+    moved = jnp.where(m.hold.held, support.target(scene, m.hold, slip, drive.motion), moved)
+    pushed = jnp.where(m.hold.held, (moved - u) / h, pushed)
+    moved, pushed = barrier((moved, pushed))
+    reaction = jnp.sum(scene.body.held.T * f[:, scene.body.fixed], axis=1)  # force of the tissue on the support
+    return State(moved, pushed, history, grip, slip, felt), Felt(force, torque, reaction, work)
+
+
+def _touch(probe, patch, u, centre, grip):
+    return jax.checkpoint(contact.forces, prevent_cse=False)(probe, patch, u, centre, grip)
