@@ -19,7 +19,7 @@ from tissuejax.recordings.format import Format
 from tissuejax.recordings.hdf5_writing import write
 from tissuejax.recordings.recording import Sample
 
-__all__ = ["formats", "names", "read", "read_all", "read_each", "write"]
+__all__ = ["convert", "formats", "names", "read", "read_all", "read_each", "write"]
 
 
 def formats() -> dict[str, Format]:
@@ -83,6 +83,28 @@ def read_each(paths: Iterable[str | os.PathLike]) -> dict[str, Sample]:
             raise InputError(f"{path}: a sample named {sample.name!r} came already: give each sample its own name")
         found[sample.name] = sample
     return found
+
+
+def convert(path: str | os.PathLike, out: str | os.PathLike) -> list[Path]:
+    """Write what any readable file holds as recording files (HDF5), one a sample; returns the files written.
+
+    Args:
+        path: a side file, a recording file, or "file#NAME" for one sample.
+        out: the file to write; with several samples its name holds "{sample}".
+
+    Raises:
+        InputError: as `read` and `write`; several samples and no "{sample}" in `out`.
+    """
+    known = names(path)
+    template = os.fspath(out)
+    if len(known) > 1 and "{sample}" not in template:
+        source = os.fspath(path)
+        raise InputError(
+            f"{path}: found {len(known)} samples, expected one for {template!r}: name one, as in {source}#{known[0]}, "
+            "or put {sample} into the output name for a file each"
+        )
+    whole = _split(path)[0]
+    return [write(read(whole, name), template.replace("{sample}", name)) for name in known]
 
 
 def _split(path: str | os.PathLike) -> tuple[Path, str | None]:

@@ -1,0 +1,268 @@
+"""The TOML side file that describes a lab's own table; parsed and checked here, carried out in `table.py`."""
+
+import functools
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tissuejax.errors import InputError, unknown
+from tissuejax.recordings.layouts import layout
+from tissuejax.units import factor, quantity
+
+# What a column may hold, and the SI unit that its own unit must convert to.
+QUANTITIES = {
+    "time": "s",
+    "stretch": "1",
+    "strain": "1",
+    "true_strain": "1",
+    "radial_stretch": "1",
+    "length": "m",
+    "displacement": "m",
+    "shear": "1",
+    "angle": "rad",
+    "nominal_stress": "Pa",
+    "true_stress": "Pa",
+    "force": "N",
+}
+KINEMATIC = tuple(QUANTITIES)[1:9]
+STRESS = tuple(QUANTITIES)[9:]
+# These turn round where compression is counted positive.
+SIGNED = ("strain", "true_strain", "displacement", "nominal_stress", "true_stress", "force")
+SPECIMEN = {
+    "height": "m",
+    "diameter": "m",
+    "area": "m^2",
+    "width": "m",
+    "thickness": "m",
+    "frozen_height": "m",
+    "frozen_diameter": "m",
+    "radius": "m",
+}
+# fmt: off
+PART = (
+    "file", "where", "sample", "recording", "experiment", "positive", "columns", "specimen", "noise",
+    "attributes", "every", "missing", "settling", "relative_to_first", "lowpass", "separator",
+    "decimal", "comment", "skip", "header",
+)
+# fmt: on
+WHOLE = ("part", "source", "notes", "density")
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of the table: where it is, and what turns it into SI."""
+
+    column: str | int
+    unit: str
+    sign: float = 1.0
+    zero: int = 0
+
+
+@dataclass(frozen=True)
+class Lookup:
+    """A second table that gives specimen sizes by a key column (one row a specimen)."""
+
+    file: str
+    key: str
+
+
+@dataclass(frozen=True)
+class Part:
+    """One kind of test in a table: which rows, what kind of experiment, what the columns hold.
+
+    `columns` holds one or two columns a quantity; `specimen` holds numbers in SI or columns; `noise` holds text
+    ("0.02 N", "estimate") or a column.
+    """
+
+    file: str
+    experiment: str
+    columns: Mapping[str, tuple[Column, ...]]
+    sample: str = "sample"
+    recording: str = "r1"
+    where: Mapping[str, object] = field(default_factory=dict)
+    positive: str = "tension"
+    specimen: Mapping[str, float | Column] = field(default_factory=dict)
+    lookup: Lookup | None = None
+    noise: Mapping[str, str | Column] = field(default_factory=dict)
+    attributes: Mapping[str, float] = field(default_factory=dict)
+    every: int = 1
+    missing: str = "refuse"
+    settling: bool = False
+    relative_to_first: bool = False
+    lowpass: float | None = None
+    reading: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class SideFile:
+    """A whole side file: its parts, and what holds for every sample in it."""
+
+    path: Path
+    parts: tuple[Part, ...]
+    source: str = ""
+    notes: str = ""
+    density: float | None = None
+
+
+def parse(path: Path) -> SideFile:
+    """Read a side file.
+
+    Raises:
+        InputError: no TOML, an unknown key (the nearest are offered), a missing one, a wrong type or unit.
+    """
+    try:
+        content = tomllib.loads(path.read_text("utf-8-sig"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: found text that is not TOML ({error}), expected a side file") from error
+    for key in content:
+        if key not in PART and key not in WHOLE:
+            raise InputError(f"{path}: {unknown('key', key, [*PART, *WHOLE])}")
+    shared = {k: v for k, v in content.items() if k in PART}
+    own = content.get("part", [{}])
+    if not isinstance(own, list) or not all(isinstance(p, dict) for p in own):
+        raise InputError(f"{path}: part: found one table, expected a list: write [[part]]")
+    density = content.get("density")
+    try:
+        return SideFile(
+            path,
+            tuple(_part(_merged(shared, p)) for p in own),
+            _typed(content, "source", str, ""),
+            _typed(content, "notes", str, ""),
+            None if density is None else quantity(density, "kg/m^3", "density"),
+        )
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _merged(shared: Mapping[str, object], own: Mapping[str, object]) -> dict[str, object]:
+    """A part's own keys over the shared ones; tables are merged key by key."""
+    both = {
+        k: {**shared[k], **v} if isinstance(v, dict) and isinstance(shared.get(k), dict) else v for k, v in own.items()
+    }
+    return {**shared, **both}
+
+
+def _typed(table: Mapping[str, object], key: str, kind: type, default: object) -> object:
+    value = table.get(key, default)
+    if key in table and (not isinstance(value, kind) or (kind is int and isinstance(value, bool))):
+        raise InputError(f"{key}: found {value!r}, expected {'a table' if kind is dict else f'a {kind.__name__}'}")
+    return value
+
+
+def _part(table: Mapping[str, object]) -> Part:
+    for key in table:
+        if key not in PART:
+            raise unknown("key", key, PART)
+    for key in ("file", "experiment", "columns"):
+        if key not in table:
+            raise InputError(f"{key}: found nothing, expected {_EXAMPLES[key]}")
+    get = functools.partial(_typed, table)
+    experiment = get("experiment", str, "")
+    layout(experiment)
+    specimen = dict(get("specimen", dict, {}))
+    lookup = None
+    if "file" in specimen or "key" in specimen:
+        if not {"file", "key"} <= specimen.keys():
+            raise InputError('specimen: expected both file = "sizes.csv" and key = "the column that names the test"')
+        lookup = Lookup(specimen.pop("file"), specimen.pop("key"))
+    lowpass = table.get("lowpass")
+    return Part(
+        file=get("file", str, ""),
+        experiment=experiment,
+        columns=_columns(get("columns", dict, {})),
+        sample=get("sample", str, "sample"),
+        recording=get("recording", str, "r1"),
+        where=get("where", dict, {}),
+        positive=_choice(table, "positive", ("tension", "compression")),
+        specimen={k: _size(k, v) for k, v in specimen.items()},
+        lookup=lookup,
+        noise={k: _noise(k, v) for k, v in get("noise", dict, {}).items()},
+        attributes=_numbers(get("attributes", dict, {})),
+        every=max(1, get("every", int, 1)),
+        missing=_choice(table, "missing", ("refuse", "drop")),
+        settling=get("settling", bool, False),
+        relative_to_first=get("relative_to_first", bool, False),
+        lowpass=None if lowpass is None else quantity(lowpass, "Hz", "lowpass"),
+        reading={k: table[k] for k in ("separator", "decimal", "comment", "skip", "header") if k in table},
+    )
+
+
+_EXAMPLES = {
+    "file": 'the table, e.g. file = "tests.csv"',
+    "experiment": 'the kind of test, e.g. experiment = "uniaxial"',
+    "columns": 'what the columns hold, e.g. [columns] with force = { column = "load", unit = "N" }',
+}
+
+
+def _choice(table: Mapping[str, object], key: str, allowed: tuple[str, ...]) -> str:
+    value = table.get(key, allowed[0])
+    if value not in allowed:
+        raise InputError(f"{key}: found {value!r}, expected {' or '.join(repr(a) for a in allowed)}")
+    return value
+
+
+def _columns(table: Mapping[str, object]) -> dict[str, tuple[Column, ...]]:
+    found = {}
+    for name, spec in table.items():
+        if name not in QUANTITIES:
+            raise unknown("quantity in [columns]", name, QUANTITIES)
+        specs = spec if isinstance(spec, list) else [spec]
+        if not 1 <= len(specs) <= 2:
+            raise InputError(f"columns.{name}: found {len(specs)} columns, expected one, or two for a biaxial test")
+        found[name] = tuple(_column(f"columns.{name}", s, QUANTITIES[name]) for s in specs)
+    for group, what in ((KINEMATIC, "the deformation"), (STRESS, "the load")):
+        given = [k for k in found if k in group]
+        if len(given) != 1:
+            came = " and ".join(given) or "nothing"
+            raise InputError(f"columns: found {came} for {what}, expected exactly one of {', '.join(group)}")
+    return found
+
+
+def _column(place: str, spec: object, si: str) -> Column:
+    if not isinstance(spec, dict) or "column" not in spec:
+        raise InputError(f'{place}: found {spec!r}, expected {{ column = "name", unit = "{si}" }}')
+    for key in spec:
+        if key not in ("column", "unit", "sign", "zero"):
+            raise InputError(f"{place}: {unknown('key', key, ('column', 'unit', 'sign', 'zero'))}")
+    if "unit" not in spec and si != "1":
+        raise InputError(f'{place}: found no unit, expected one that converts to {si!r}, e.g. unit = "{si}"')
+    unit = spec.get("unit", "1")
+    try:
+        factor(unit, si)
+    except InputError as error:
+        raise InputError(f"{place}: {error}") from error
+    sign, zero = spec.get("sign", 1), spec.get("zero", 0)
+    if sign not in (1, -1):
+        raise InputError(f"{place}.sign: found {sign!r}, expected 1 or -1")
+    if not isinstance(zero, int) or zero < 0:
+        raise InputError(f"{place}.zero: found {zero!r}, expected true or how many first samples are averaged as zero")
+    return Column(spec["column"], unit, float(sign), int(zero))
+
+
+def _size(name: str, value: object) -> float | Column:
+    if name not in SPECIMEN:
+        raise InputError(str(unknown("size in [specimen]", name, [*SPECIMEN, "file", "key"])))
+    if isinstance(value, dict):
+        return _column(f"specimen.{name}", value, SPECIMEN[name])
+    size = quantity(value, SPECIMEN[name], f"specimen.{name}")
+    if size <= 0:
+        raise InputError(f"specimen.{name}: found {value!r}, expected a size above zero")
+    return size
+
+
+def _noise(name: str, value: object) -> str | Column:
+    if name not in QUANTITIES or name == "time":
+        raise unknown("quantity in [noise]", name, [q for q in QUANTITIES if q != "time"])
+    if isinstance(value, dict):
+        return _column(f"noise.{name}", value, QUANTITIES[name])
+    if value != "estimate" and quantity(value, QUANTITIES[name], f"noise.{name}") < 0:
+        raise InputError(f"noise.{name}: found {value!r}, expected a standard deviation that is not negative")
+    return str(value)
+
+
+def _numbers(table: Mapping[str, object]) -> dict[str, float]:
+    for name, value in table.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InputError(f"attributes.{name}: found {value!r}, expected a number in SI")
+    return {name: float(value) for name, value in table.items()}

@@ -1,0 +1,238 @@
+"""The rows of one test turned into a Recording: units, signs, zeroing, filter, then stretch and nominal stress."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from tissuejax.errors import InputError
+from tissuejax.recordings import checks, rig
+from tissuejax.recordings import conversions as convert
+from tissuejax.recordings.delimited import Columns
+from tissuejax.recordings.recording import Channel, Recording
+from tissuejax.recordings.side_file import KINEMATIC, QUANTITIES, SIGNED, STRESS, Column, Part
+from tissuejax.units import factor, quantity
+
+IN_SHEAR = ("shear", "angle", "displacement")
+Sizes = Mapping[str, float]
+
+
+def recording_from(
+    part: Part, columns: Columns, rows: np.ndarray, sizes: Sizes, name: str, place: str
+) -> tuple[Recording, list[str]]:
+    """The recording in `rows` of a table, and what to note about how it came to be.
+
+    Args:
+        part: what the side file says of these rows.
+        columns: the table.
+        rows: indices of the rows, in order.
+        sizes: specimen sizes, SI.
+        name: the recording's name.
+        place: file, sample and recording, for messages.
+
+    Raises:
+        InputError: missing or bad cells (with line and column), times that don't increase, stretch <= 0, a missing
+            specimen size, a quantity that doesn't go with the experiment, fewer than 2 samples.
+    """
+    notes = []
+    values, rows = _numbers(part, columns, rows, place)
+    if len(rows) < 2:
+        raise checks.refusal(place, "rows", f"{len(rows)} sample(s)", "at least 2 samples")
+    timed = "time" in values
+    time = values.pop("time", None)
+    if not timed:
+        time = np.arange(len(rows), dtype=float)
+        notes.append("No time was recorded: samples are taken as 1 s apart.")
+    checks.increasing(time, place, f"column {part.columns['time'][0].column!r}" if timed else "time")
+    if part.lowpass is not None:
+        values = {q: rig.lowpass(time, v, part.lowpass) for q, v in values.items()}
+        notes.append(f"Butterworth low-pass at {part.lowpass:g} Hz.")
+    keep = slice(None, None, part.every)
+    time, values = time[keep], {q: v[keep] for q, v in values.items()}
+    kinematic = next(q for q in values if q in KINEMATIC)
+    load = next(q for q in values if q in STRESS)
+    given = {k: sizes[k] for k in ("height", "diameter") if k in sizes}
+    attributes = dict(part.attributes) | given
+    if part.experiment in ("probing", "cutting"):
+        return _probing(part, time, values, kinematic, load, sizes, name, place, attributes), notes
+    motion = _motion(part, values[kinematic], kinematic, sizes, place)
+    if load == "force":
+        attributes["area"] = _area(sizes, place)
+    stress, per_unit = _stress(values[load], load, motion, attributes.get("area"), part, place)
+    abscissa = time if timed else _path(motion)
+    noise = _noise(part, load, columns, rows, per_unit, abscissa, stress)
+    key = "shear" if part.experiment == "simple-shear" else "stretch"
+    told = part.noise.get(kinematic)
+    if told is not None and told != "estimate":
+        slope = _slope(values[kinematic], motion, kinematic, sizes)
+        attributes[f"{key}/noise_std"] = _said(told, kinematic, columns, rows) * slope
+    channel = Channel(time, stress, "Pa", noise)
+    return Recording(name, part.experiment, {"time": time, key: motion}, {"nominal_stress": channel}, attributes), notes
+
+
+def _numbers(part: Part, columns: Columns, rows: np.ndarray, place: str) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Columns in SI with sign and zero applied, and the rows kept."""
+    raw = {q: np.stack([columns.numbers(c.column)[rows] for c in cs], axis=1) for q, cs in part.columns.items()}
+    bad = np.any([~np.isfinite(v).all(axis=1) for v in raw.values()], axis=0)
+    if bad.any() and part.missing == "drop":
+        raw, rows = {q: v[~bad] for q, v in raw.items()}, rows[~bad]
+    for q, v in raw.items():
+        broken = np.argwhere(~np.isfinite(v))
+        if len(broken):
+            i, j = broken[0]
+            item = f"line {columns.lines[rows[i]]}, column {part.columns[q][j].column!r}"
+            found = f"{v[i, j]} ({len(broken)} such cells)"
+            raise checks.refusal(place, item, found, "a number", 'missing = "drop" leaves such rows out.')
+    turned = {"compression": -1.0, "tension": 1.0}[part.positive]
+    values = {}
+    for q, v in raw.items():
+        scaled = [
+            _scaled(v[:, j], c, QUANTITIES[q], turned if q in SIGNED else 1.0) for j, c in enumerate(part.columns[q])
+        ]
+        values[q] = np.stack(scaled, axis=1) if len(scaled) > 1 else scaled[0]
+    return values, rows
+
+
+def _scaled(values: np.ndarray, column: Column, si: str, turned: float) -> np.ndarray:
+    if column.zero and len(values):
+        values = values - values[: column.zero].mean()
+    return values * (factor(column.unit, si) * column.sign * turned)
+
+
+def _need(sizes: Sizes, name: str, what: str, place: str) -> float:
+    if name not in sizes:
+        raise checks.refusal(place, f"specimen.{name}", "nothing", f"a size, to turn {what}", "Add it to [specimen].")
+    return sizes[name]
+
+
+def _motion(part: Part, values: np.ndarray, kind: str, sizes: Sizes, place: str) -> np.ndarray:
+    """Stretch, or the amount of shear, from what was measured."""
+    two = values.ndim == 2
+    if two != (part.experiment == "biaxial"):
+        found = f"{2 if two else 1} column(s) of {kind}"
+        raise checks.refusal(place, "columns", found, "two for a biaxial test, one for any other")
+    if (part.experiment == "simple-shear") != (kind in ("shear", "angle")) and kind != "displacement":
+        expected = f"one of {', '.join(q for q in KINEMATIC if (q in IN_SHEAR) == (part.experiment == 'simple-shear'))}"
+        raise checks.refusal(place, f"columns for {part.experiment}", kind, expected)
+    if kind == "radial_stretch" and part.experiment != "uniaxial":
+        raise checks.refusal(place, f"columns for {part.experiment}", kind, "radial_stretch in a uniaxial test only")
+    if part.experiment == "simple-shear":
+        if kind == "displacement":
+            return values / _need(sizes, "height", "displacement into shear", place)
+        return np.tan(values) if kind == "angle" else values
+    if kind == "displacement":
+        stretch = convert.stretch_from_displacement(values, _need(sizes, "height", "displacement into stretch", place))
+    elif kind == "length":
+        stretch = values / sizes.get("height", values[0])
+    else:
+        if kind == "radial_stretch":
+            checks.stretches(values, place, "column of radial_stretch")
+        stretch = {
+            "stretch": lambda v: v,
+            "strain": convert.stretch_from_strain,
+            "true_strain": convert.stretch_from_true_strain,
+            "radial_stretch": rig.compression_stretch,
+        }[kind](values)
+    checks.stretches(stretch, place, f"stretch from {kind}")
+    if part.settling:
+        frozen = _need(sizes, "frozen_height", "the settled height back", place)
+        stretch = rig.settled_stretch(stretch, frozen, _need(sizes, "height", "the settled height back", place))
+    return stretch / stretch[0] if part.relative_to_first else stretch
+
+
+def _area(sizes: Sizes, place: str) -> float:
+    if "area" in sizes:
+        return sizes["area"]
+    if "width" in sizes and "thickness" in sizes:
+        return sizes["width"] * sizes["thickness"]
+    if "frozen_diameter" in sizes:
+        frozen = _need(sizes, "frozen_height", "the frozen volume into an area", place)
+        return rig.thawed_area(sizes["frozen_diameter"] / 2, frozen, _need(sizes, "height", "volume into area", place))
+    if "diameter" in sizes:
+        return convert.disc_area(sizes["diameter"])
+    expected = "area, diameter, width and thickness, or frozen_diameter and frozen_height, to turn force into stress"
+    raise checks.refusal(place, "specimen", f"{', '.join(sizes) or 'nothing'}", expected)
+
+
+def _stress(
+    values: np.ndarray, kind: str, motion: np.ndarray, area: float | None, part: Part, place: str
+) -> tuple[np.ndarray, float]:
+    """Nominal stress, and what one unit of the measured quantity is in it (for noise)."""
+    if values.ndim != motion.ndim:
+        raise checks.refusal(place, "columns", f"{values.ndim} axes of {kind}", f"{motion.ndim}, as of the deformation")
+    if kind == "force":
+        return convert.nominal_from_force(values, area), 1.0 / area
+    # In simple shear the shear components of Cauchy and nominal stress are the same: P12 = sigma12.
+    if kind == "true_stress" and part.experiment != "simple-shear":
+        return convert.nominal_from_true(values, motion), float(np.sqrt(np.mean(motion**-2.0)))
+    return values, 1.0
+
+
+def _path(motion: np.ndarray) -> np.ndarray:
+    """Length of the way through deformation: the abscissa of a smooth curve where no time was recorded."""
+    steps = np.abs(np.diff(motion.reshape(len(motion), -1), axis=0)).sum(axis=1)
+    return np.concatenate([[0.0], np.cumsum(np.maximum(steps, 1e-12))])
+
+
+def _said(told: str | Column, quantity_name: str, columns: Columns, rows: np.ndarray) -> float:
+    """A noise level as the side file gives it, SI; the quadratic mean of a column."""
+    si = QUANTITIES[quantity_name]
+    if isinstance(told, Column):
+        values = columns.numbers(told.column)[rows] * factor(told.unit, si)
+        return float(np.sqrt(np.nanmean(values**2)))
+    return quantity(told, si)
+
+
+def _noise(
+    part: Part, load: str, columns: Columns, rows: np.ndarray, per_unit: float, abscissa: np.ndarray, stress: np.ndarray
+) -> float:
+    others = [q for q in part.noise if q in STRESS and q not in (load, "nominal_stress")]
+    if others:
+        raise InputError(f"noise.{others[0]}: the load column is {load}: give noise.{load} or noise.nominal_stress")
+    for q, scale in ((load, per_unit), ("nominal_stress", 1.0)):
+        if part.noise.get(q, "estimate") != "estimate":
+            return _said(part.noise[q], q, columns, rows) * scale
+    # A floor, because exact data would weigh infinitely.
+    return max(convert.noise_estimate(abscissa, stress), 1e-6 * float(np.abs(stress).max()))
+
+
+def _slope(values: np.ndarray, motion: np.ndarray, kind: str, sizes: Sizes) -> float:
+    """Quadratic mean of d(stretch)/d(measured), to carry noise over."""
+    slopes = {
+        "displacement": lambda: 1.0 / sizes["height"],
+        "length": lambda: 1.0 / sizes.get("height", np.ravel(values)[0]),
+        "true_strain": lambda: motion,
+        "radial_stretch": lambda: 2.0 / values**3,
+        "angle": lambda: 1.0 + motion**2,
+    }
+    return float(np.sqrt(np.mean(np.square(slopes.get(kind, lambda: 1.0)()))))
+
+
+def _probing(
+    part: Part,
+    time: np.ndarray,
+    values: Mapping[str, np.ndarray],
+    kinematic: str,
+    load: str,
+    sizes: Sizes,
+    name: str,
+    place: str,
+    attributes: dict[str, float],
+) -> Recording:
+    """A tip pressed straight down: displacement into the sample and the force that pushes back, both positive.
+
+    The tip's centre starts at height + radius (height 0 where unknown): touching at zero displacement.
+    """
+    if part.experiment != "probing" or (kinematic, load) != ("displacement", "force"):
+        expected = "displacement and force in a probing test; cutting comes in recording files only"
+        raise checks.refusal(place, f"columns for {part.experiment}", f"{kinematic} and {load}", expected)
+    radius = _need(sizes, "radius", "displacement into the tip's position", place)
+    position = np.zeros((len(time), 3))
+    position[:, 2] = sizes.get("height", 0.0) + radius - values["displacement"]
+    force = np.zeros((len(time), 3))
+    force[:, 2] = values["force"]
+    told = part.noise.get("force", "estimate")
+    estimate = max(convert.noise_estimate(time, values["force"]), 1e-6 * float(np.abs(values["force"]).max()))
+    noise = estimate if told == "estimate" else quantity(told, "N")
+    inputs = {"probe/time": time, "probe/position": position}
+    channel = Channel(time, force, "N", noise)
+    return Recording(name, "probing", inputs, {"force": channel}, attributes | {"probe/radius": radius})
