@@ -13,7 +13,8 @@ class ProbingTest(eqx.Module):
         mass: each node's share of the mass of each element, kg per node (element mass / nodes of an element).
         below_top: depth of every node under the free surface above it, m.
         height: thickness of the tissue under the probe, m.
-        first_touch: contact begins, on the recording's clock, s.
+        first_touch: contact begins, on the recording's clock, s (NaN if never).
+        rest: rest positions of the markers, m.
     """
 
     start: Float[Array, ""]
@@ -22,3 +23,4 @@ class ProbingTest(eqx.Module):
     below_top: Float[Array, " N"]
     height: Float[Array, ""]
     first_touch: Float[Array, ""]
+    rest: Float[Array, "k 3"]

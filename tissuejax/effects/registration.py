@@ -57,7 +57,6 @@ class Registration(Effect):
         seen = channels["markers"]
         c, s = jnp.cos(p["turn"]), jnp.sin(p["turn"])
         x, y, z = (seen.values[..., i] for i in range(3))
-        x0, y0 = x[:1], y[:1]  # displacements turn, rest positions are measured
-        dx, dy = x - x0, y - y0
+        dx, dy = x - test.rest[:, 0], y - test.rest[:, 1]  # displacements turn, rest positions are measured
         turned = jnp.stack([x + (c - 1.0) * dx - s * dy, y + s * dx + (c - 1.0) * dy, z], -1)
         return {**channels, "markers": Channel(seen.time, turned, seen.unit, seen.noise_std)}

@@ -1,0 +1,182 @@
+"""The predictor of probings: recordings side by side on the cores, compiled programs shared and kept on disk.
+
+One compiled forward program serves all recordings of like padded size; the Jacobian runs in programs of a few forward
+tangents each, because one program with everything in it is slower to compile and to run. A prediction that is not
+finite is refused with the time and the element, never masked.
+"""
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from tissuejax.cache import keep_programs
+from tissuejax.errors import UnstableSimulation, unknown
+from tissuejax.experiments.homogeneous import local
+from tissuejax.experiments.predictor import Predictor, Tangents
+from tissuejax.experiments.probing import Simulated, simulated
+from tissuejax.experiments.probing_settings import ProbingSettings
+from tissuejax.experiments.probing_setup import Setup, setups
+from tissuejax.model import Model
+from tissuejax.parameters import Values
+from tissuejax.recordings.recording import Channel, Recording, Sample
+from tissuejax.tled.simulate import COMPILER_OPTIONS
+
+
+class ProbingPredictor(Predictor):
+    """Predicts probings; see `Predictor`.
+
+    Attributes:
+        settings: numerical choices.
+        setups: each recording made ready.
+    """
+
+    name: ClassVar[str] = "probing"
+    model: Model
+    sample: Sample
+    names: tuple[str, ...]
+    settings: ProbingSettings = eqx.field(static=True)
+    setups: Mapping[str, Setup]
+
+    @classmethod
+    def prepare(
+        cls, model: Model, sample: Sample, names: tuple[str, ...], settings: ProbingSettings | None = None, **options
+    ) -> "ProbingPredictor":
+        """See `predictor`; `settings`, or single settings by name (`compression=10`)."""
+        keep_programs()
+        settings = (settings or ProbingSettings()).changed(**options)
+        return cls(model.across(names), sample, names, settings, setups(model, sample, names, settings))
+
+    def of(self, names: Sequence[str]) -> "ProbingPredictor":
+        """The same model for other recordings of the sample."""
+        return self.prepare(self.model, self.sample, tuple(names), self.settings)
+
+    def with_settings(self, settings: ProbingSettings) -> "ProbingPredictor":
+        """The same recordings simulated otherwise."""
+        return self.prepare(self.model, self.sample, self.names, settings)
+
+    def with_model(self, model: Model) -> "ProbingPredictor":
+        """Another model (further effects) in the same prepared scenes."""
+        if type(model.volumetric) is not type(self.model.volumetric) or model.energy != self.model.energy:
+            return self.prepare(model, self.sample, self.names, self.settings)
+        return ProbingPredictor(model.across(self.names), self.sample, self.names, self.settings, self.setups)
+
+    def predict(self, values: Values) -> dict[str, Recording]:
+        """Predicted recordings by name; see `Predictor.predict`.
+
+        Raises:
+            UnstableSimulation: a run broke down (unless the values are traced: then the prediction is NaN).
+        """
+        return {name: self._reported(name, out.channels) for name, out in self.run(values).items()}
+
+    def run(self, values: Values) -> dict[str, Simulated]:
+        """The simulations behind `predict`, with their checks."""
+        bare = self.model.across(())
+        thetas = {name: _vector(local(self.model, values, name)) for name in self.names}
+        jobs = [lambda n=name: _predict(bare, thetas[n], self.setups[n]) for name in self.names]
+        out = dict(zip(self.names, self._side_by_side(jobs, thetas), strict=True))
+        for name, run in out.items():
+            self._refuse_failed(name, run)
+        return out
+
+    def jacobian(self, values: Values, paths: Sequence[str]) -> tuple[dict[str, Recording], Tangents]:
+        """Prediction and derivatives; see `Predictor.jacobian`."""
+        for path in paths:
+            if path not in self.model.parameters:
+                raise unknown("parameter", path, self.model.parameters)
+        bare = self.model.across(())
+        declared = list(self.model.declared)
+        thetas, jobs, place = {}, [], []
+        for name in self.names:
+            thetas[name] = _vector(local(self.model, values, name))
+            basis = np.zeros((len(paths), len(declared)))
+            for i, path in enumerate(paths):
+                basis[i] = [path in self.model.source_of(generic, name) for generic in declared]
+            felt = np.flatnonzero(basis.any(1))
+            for part in _parts(felt, self.settings.tangents):
+                jobs.append(lambda n=name, b=basis[part]: _linearised(bare, thetas[n], self.setups[n], b))
+                place.append((name, part))
+        recordings, tangents = {}, {path: {} for path in paths}
+        for (name, part), (run, slopes) in zip(place, self._side_by_side(jobs, thetas), strict=True):
+            self._refuse_failed(name, run)
+            recordings[name] = self._reported(name, run.channels)
+            for row, i in enumerate(part):
+                tangents[paths[i]][name] = {channel: slope[row] for channel, slope in slopes.items()}
+        for name in self.names:
+            if name not in recordings:  # no path acts in this recording
+                recordings |= self.of([name]).predict(values)
+            zero = {c: np.zeros(np.shape(ch.values)) for c, ch in recordings[name].channels.items()}
+            for path in paths:
+                tangents[path].setdefault(name, zero)
+        return recordings, tangents
+
+    def _side_by_side(self, jobs: list, thetas: Mapping[str, Array]) -> list:
+        """Run the jobs on as many threads as the settings say; in order and alone where values are traced."""
+        if any(isinstance(t, jax.core.Tracer) for t in thetas.values()):
+            return [job() for job in jobs]
+        if self.settings.threads == 1 or len(jobs) == 1:
+            return [jax.device_get(job()) for job in jobs]
+        with ThreadPoolExecutor(self.settings.threads) as pool:
+            return list(pool.map(lambda job: jax.device_get(job()), jobs))
+
+    def _refuse_failed(self, name: str, run: Simulated) -> None:
+        if isinstance(run.failed, jax.core.Tracer):
+            return
+        finite = all(np.isfinite(v[..., 0]).any() for v in run.channels.values())
+        if int(run.failed) < 0 and finite:
+            return
+        setup = self.setups[name]
+        cells = np.asarray(setup.scene.body.cells)
+        x, y, z = 1e3 * np.asarray(setup.scene.body.points)[cells[int(run.element)]].mean(0)
+        when = float(setup.scene.clock.ends[int(run.failed)])
+        raise UnstableSimulation(
+            f"recording {name}: the simulation broke down by t = {when:.3g} s at element {int(run.element)} near "
+            f"({x:.1f}, {y:.1f}, {z:.1f}) mm; lower `compression` or `step`, or start from softer, "
+            "more stable parameters"
+        )
+
+    def _reported(self, name: str, channels: Mapping[str, Array]) -> Recording:
+        measured = self.sample.recordings[name]
+        told = {c: Channel(measured.channels[c].time, v, measured.channels[c].unit) for c, v in channels.items()}
+        return Recording(name, measured.experiment, measured.inputs, told, measured.attributes)
+
+
+def _parts(indices: np.ndarray, size: int) -> list[np.ndarray]:
+    """Indices in even parts of at most `size`: few different sizes, so few programs."""
+    return np.array_split(indices, -(-len(indices) // size)) if len(indices) else []
+
+
+@partial(jax.jit, static_argnums=0, compiler_options=COMPILER_OPTIONS)
+def _predict(model: Model, theta: Float[Array, " p"], setup: Setup) -> Simulated:
+    return simulated(model, dict(zip(model.declared, theta)), setup)
+
+
+@partial(jax.jit, static_argnums=0, compiler_options=COMPILER_OPTIONS)
+def _linearised(
+    model: Model, theta: Float[Array, " p"], setup: Setup, basis: Float[Array, "k p"]
+) -> tuple[Simulated, dict[str, Float[Array, "k ..."]]]:
+    """Prediction and its derivative along each row of `basis`; the primal runs once."""
+
+    def channels(x):
+        out = simulated(model, dict(zip(model.declared, x)), setup)
+        return out.channels, out
+
+    def along(direction):
+        _, slopes, out = jax.jvp(channels, (theta,), (direction,), has_aux=True)
+        return slopes, out
+
+    slopes, out = jax.vmap(along, out_axes=(0, None))(basis)
+    return out, slopes
+
+
+def _vector(values: Mapping[str, Array]) -> Float[Array, " p"]:
+    """One array for all values: on the host unless one of them is traced."""
+    if any(isinstance(v, jax.core.Tracer) for v in values.values()):
+        return jnp.stack([jnp.asarray(v) for v in values.values()])
+    return np.array([float(v) for v in values.values()])
