@@ -72,8 +72,8 @@ def silhouette(image: Image, sigma: float = 1.5, platens: tuple[float, float] | 
     found = np.flatnonzero(edges[max(row - 1, 0) : row + 2].any(axis=0))
     if len(found) < 2:
         raise InputError(
-            f"picture: {len(found)} outline points at row {row}; expected the two sides of a specimen between the platens "
-            "(more contrast, or another sigma, may help)"
+            f"picture: {len(found)} outline points at row {row}; expected the two sides of a specimen between the "
+            "platens (more contrast, or another sigma, may help)"
         )
     line = _line(grey, middle)
     return Silhouette(top, bottom, _between(line, int(found[0])), _between(line, int(found[-1])))
