@@ -77,6 +77,7 @@ def fit(
     weights: str | Mapping[str, float] = "auto",
     channels: Sequence[str] = (),
     loss: str = "squares",
+    stable: bool = False,
     method: str = "levenberg-marquardt",
     multistart: int = 4,
     seed: int = 0,
@@ -91,6 +92,7 @@ def fit(
         only, holdout: recordings to fit, and to predict only.
         free, fix, start, bounds, priors: by dotted path, SI; see `fitting.setup.problem`.
         weights, channels, loss: what a unit of misfit means.
+        stable: keep the energy stable (Drucker) over the recorded stretches.
         method: "levenberg-marquardt", "adam" or "lbfgs".
         multistart, seed: number of starts and seed of those after the first.
         max_steps: evaluations for each start.
@@ -116,6 +118,7 @@ def fit(
         weights=weights,
         channels=tuple(channels),
         loss=loss,
+        stable=stable,
     )
     with (progress or Silent()).stage(f"fitting {energy.energy.name} to {sample.name}", None) as stage:
         return fit_problem(

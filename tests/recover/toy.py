@@ -4,8 +4,28 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from tissuejax.energies.energy import Energy
 from tissuejax.parameters import Parameter
 from tissuejax.recordings.recording import Channel, Recording, Sample
+
+
+class ToyEnergy(Energy):
+    """Neo-Hookean in a, so that there is something to be stable."""
+
+    name = "toy"
+    formula = "a/2 (I1bar - 3)"
+    shear_modulus = "a"
+    source = "none"
+
+    @property
+    def parameters(self):
+        return tuple(ToyModel.parameters.values())
+
+    def isochoric(self, p, strain):
+        return 0.5 * p["a"] * (strain.I1 - 3)
+
+    def initial_shear_modulus(self, p):
+        return p["a"]
 
 
 class ToyModel:
@@ -20,8 +40,7 @@ class ToyModel:
     effects = ()
     volumetric = None
 
-    class energy:
-        name, formula, source = "toy", "a exp(-rate t)", "none"
+    energy = ToyEnergy()
 
     defaults = {path: d.default for path, d in parameters.items()}
 

@@ -3,7 +3,7 @@
 import math
 from typing import TYPE_CHECKING
 
-from tissuejax.fitting.stability import unstable
+from tissuejax.fitting.stability import sentence
 
 if TYPE_CHECKING:
     from tissuejax.fitting.result import Fit
@@ -23,8 +23,8 @@ def warnings_of(found: "Fit") -> list[str]:
         limit = lower if side == "lower" else upper
         unit = problem.predictor.model.parameters[path].unit
         said.append(f"{path} ended at its {side} bound ({limit:g} {unit}); its standard error means little there.")
-    said += [sentence[0].upper() + sentence[1:] for sentence in found.uncertainty.sentences]
-    said += unstable(found)
+    said += [text[0].upper() + text[1:] for text in found.uncertainty.sentences]
+    said += [text] if (text := sentence(found.stability)) else []
     said += _misfit(found)
     said += _serial(found)
     said += _held_out(found)

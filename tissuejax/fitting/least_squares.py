@@ -19,6 +19,7 @@ from tissuejax.fitting.losses import soften
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
+from tissuejax.fitting.stability import recorded_stability
 from tissuejax.fitting.starts import scaled_to_data, variations
 from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
 
@@ -135,6 +136,7 @@ def fit(
         channels=scores(measured, inside, std),
         holdout=scores(measured, {name: predictions[name] for name in holdout}, std),
         predictions=predictions,
+        stability=recorded_stability(problem.predictor, values),
         trace=[Iterate(i, 2 * cost, problem.values(x)) for i, (cost, x) in enumerate(best.trace, start=1)],
         starts=starts,
         n_evaluations=n,

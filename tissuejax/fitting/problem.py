@@ -15,6 +15,7 @@ from jaxtyping import Float
 from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.predictor import Predictor
 from tissuejax.fitting.losses import checked_loss
+from tissuejax.fitting.stability import penalty_rows
 from tissuejax.fitting.transforms import Box, checked_bounds
 from tissuejax.fitting.weights import Noise
 
@@ -31,6 +32,7 @@ class Problem:
         bounds: (lower, upper) by path where they differ from the declared range.
         priors: (mean, standard deviation) by path.
         loss: "squares", "soft-l1" or "cauchy".
+        stiffness: strength of the stability constraint; 0 leaves it out.
     """
 
     predictor: Predictor
@@ -40,6 +42,7 @@ class Problem:
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     loss: str = "squares"
+    stiffness: float = 0.0
 
     def __post_init__(self):
         declared = self.predictor.model.parameters
@@ -146,7 +149,10 @@ class Problem:
         return self._stack(self.predictor.predict(dict(values)), values)
 
     def linearised(self, values: Mapping[str, float]) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n p"]]:
-        """Residuals and their Jacobian to the free parameters; one forward-mode run."""
+        """Residuals and their Jacobian to the free parameters; one forward-mode run.
+
+        With the stability constraint its rows come last; they are zero where the energy is stable.
+        """
         predicted, slopes = self.predictor.jacobian(dict(values), self.free)
         jacobian = np.empty((self.n_samples + len(self.priors), len(self.free)))
         for column, path in enumerate(self.free):
@@ -155,7 +161,11 @@ class Problem:
                 jacobian[rows, column] = slope / self.sigma(key)
             for row, (prior, (_, std)) in enumerate(self.priors.items(), start=self.n_samples):
                 jacobian[row, column] = (prior == path) / std
-        return self._stack(predicted, values), jacobian
+        r = self._stack(predicted, values)
+        if self.stiffness:
+            rows, slopes = penalty_rows(self.predictor, values, self.free, self.stiffness)
+            r, jacobian = np.concatenate([r, rows]), np.concatenate([jacobian, slopes])
+        return r, jacobian
 
     def _stack(self, predicted, values) -> Float[np.ndarray, " n"]:
         parts = []

@@ -8,9 +8,12 @@ from importlib import metadata
 import jax
 import numpy as np
 
+from tissuejax.energies.catalogue import forms_of, name_of
+from tissuejax.energies.stability import Stability
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.scores import Score
 from tissuejax.fitting.uncertainty import Uncertainty
+from tissuejax.model import Model
 from tissuejax.recordings.recording import Recording
 
 FORMAT = 1
@@ -40,6 +43,7 @@ class Fit:
         holdout: the same for recordings that took no part.
         predictions: predicted recordings, fitted and held out.
         trace: accepted points of the best start.
+        stability: of the energy (Drucker) over the recorded stretches.
         starts: final chi-square of every start, in the order tried (NaN for one that failed).
         n_evaluations: runs of the model with derivatives, all starts together.
         seconds: wall time, compilation included.
@@ -57,6 +61,7 @@ class Fit:
     holdout: dict[str, Score]
     predictions: Mapping[str, Recording]
     trace: list[Iterate]
+    stability: Stability
     starts: list[float]
     n_evaluations: int
     seconds: float
@@ -124,6 +129,9 @@ class Fit:
                 key: {"std": s, "estimated": key in self.problem.noise.groups}
                 for key, s in self.problem.noise.std.items()
             },
+            "stable_between": {
+                name: [list(piece) for piece in path.ranges] for name, path in self.stability.paths.items()
+            },
             "channels": {key: s.record() for key, s in self.channels.items()},
             "holdout": {key: s.record() for key, s in self.holdout.items()},
             "warnings": list(self.warnings),
@@ -135,11 +143,15 @@ class Fit:
         }
 
 
-def described(model) -> dict:
+def described(model: Model) -> dict:
     """The energy's name and the named forms that its numbers depend on."""
-    forms = {f: str(v) for f, v in vars(model.energy).items() if isinstance(v, str | int) and not f.startswith("_")}
-    forms["volumetric"] = model.volumetric.name if model.volumetric is not None else "incompressible"
-    return {"name": model.energy.name, "formula": model.energy.formula, "forms": forms, "source": model.energy.source}
+    return {
+        "name": name_of(model.energy),
+        "formula": model.energy.formula,
+        "forms": forms_of(model.energy, model.volumetric),
+        "volumetric": None if model.volumetric is None else name_of(model.volumetric),
+        "source": model.energy.source,
+    }
 
 
 def versions() -> dict[str, str]:

@@ -1,6 +1,7 @@
 """From what a user says (which recordings, what is fixed, bounds, priors) to a checked problem."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.predictor import Predictor
@@ -9,6 +10,8 @@ from tissuejax.fitting.transforms import checked_bounds
 from tissuejax.fitting.weights import noise
 from tissuejax.parameters import checked
 from tissuejax.recordings.recording import Sample
+
+STIFFNESS = 300.0  # an instability of 1 % of the mean stiffness costs as much as a misfit of 3 noise levels everywhere
 
 
 def split(
@@ -50,6 +53,7 @@ def problem(
     weights: str | Mapping[str, float] = "auto",
     channels: tuple[str, ...] = (),
     loss: str = "squares",
+    stable: bool = False,
 ) -> Problem:
     """A problem with everything that is not said taken from the declarations.
 
@@ -63,6 +67,7 @@ def problem(
         weights: "auto", "uniform", "relative" or standard deviations by channel.
         channels: only these channels, e.g. ("force",).
         loss: "squares", "soft-l1" or "cauchy".
+        stable: keep the energy stable (Drucker) over the recorded stretches.
 
     Raises:
         InputError: unknown paths, values outside their range, empty bounds, too few samples.
@@ -86,4 +91,5 @@ def problem(
         if path not in start and path not in fix:
             values[path] = min(max(values[path], lower), upper)
     found = noise(predictor.sample, predictor.names, weights, channels)
-    return Problem(predictor, tuple(free), values, found, bounds, dict(priors or {}), loss)
+    posed = Problem(predictor, tuple(free), values, found, bounds, dict(priors or {}), loss)
+    return replace(posed, stiffness=STIFFNESS * posed.n_samples**0.5) if stable else posed

@@ -1,0 +1,1 @@
+"""Sub-commands of `tissuejax`, one a file, found by walking this folder."""

@@ -1,0 +1,67 @@
+"""`tissuejax fit`: parameters of a strain energy from recordings, with uncertainties, figures and a held-out check."""
+
+import argparse
+from pathlib import Path
+from typing import ClassVar
+
+from tissuejax import verbs
+from tissuejax.commands.arguments import add_fit, add_model, fit_options
+from tissuejax.commands.command import Command, Reply
+from tissuejax.fitting.result import Fit
+from tissuejax.progress import for_terminal
+from tissuejax.recordings.files import read
+from tissuejax.report import sentences
+
+
+class FitCommand(Command):
+    """Fit a sample and write result.json, report.html and figures."""
+
+    name: ClassVar[str] = "fit"
+    order: ClassVar[int] = 30
+    summary: ClassVar[str] = "estimate parameters from recordings, with uncertainties and a held-out check"
+    teaches: ClassVar[str] = """
+Estimate the parameters of a strain energy from the recordings of one sample.
+
+FILE is a recording file (.h5) or a side file (.toml) that says how to read a lab's own table; FILE#NAME picks one
+sample of many. All recordings are fitted together, except those held out, which are predicted only. What is written
+into --out: result.json (every number), report.html (one page to read and keep) and the figures as PNG.
+
+  tissuejax fit liver.h5 --energy reduced-polynomial-2 --holdout r3 --out out/liver
+  tissuejax fit rubber.toml --energy ogden-3 --ogden-form mu/alpha --out out/rubber
+  tissuejax fit skin.toml --energy demiray+fibre --fix "energy.kappa=0.1" --bounds "energy.k2=0:50"
+
+Exit code 0: done; 2: the input can't be used (the message says why); 3: the search did not converge (what was found is
+written all the same, with a warning on top).
+"""
+
+    def arguments(self, parser: argparse.ArgumentParser) -> None:
+        """FILE, model, fit options and --out."""
+        parser.add_argument(
+            "file", metavar="FILE", help="recording file or side file; FILE#NAME for one sample of many"
+        )
+        add_model(parser)
+        add_fit(parser)
+        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="where to write (default: out/SAMPLE)")
+
+    def run(self, given: argparse.Namespace) -> Reply:
+        """Read, fit, write."""
+        sample = read(given.file)
+        model = verbs.material(
+            given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
+        ).across(tuple(sample.recordings))
+        found = verbs.fit(sample, model, progress=for_terminal(), **fit_options(given, model.parameters))
+        written = verbs.write(found, given.out or Path("out") / sample.name)
+        return reply(found, written)
+
+
+def reply(found: Fit, written: dict[str, Path]) -> Reply:
+    """The answer to a fit: the record, and the main numbers as text."""
+    lines = [sentences.summary(found), ""]
+    lines += [f"  {row['path']:<28}{row['value']:>24} {row['unit']:<6}{row['note']}" for row in sentences.table(found)]
+    lines.append("")
+    lines += [f"  {e['key']:<40}{e['kind']:<10}RMSE {e['rmse']:<12}R2 {e['r2']}" for e in sentences.errors(found)[:40]]
+    lines += ["", *(f"  ! {warning}" for warning in found.warnings)] if found.warnings else []
+    lines += ["", f"page     {written['page']}", f"numbers  {written['result']}"]
+    lines.append(f"figures  {', '.join(str(p) for n, p in written.items() if n not in ('page', 'result'))}")
+    record = found.record() | {"files": {name: str(path) for name, path in written.items()}}
+    return Reply(record, "\n".join(lines), 0 if found.converged else 3)
