@@ -1,0 +1,87 @@
+"""Happenings that no catalogue of effects lists: the right answer to these is "unexplained".
+
+Each takes what was recorded without it and an `amount`; `where` are numbers drawn for the case.
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+from tissuejax.challenge.specimen import Trial
+
+History = Float[np.ndarray, "n ..."]
+
+
+def first_hold(trial: Trial) -> float:
+    """When the first hold away from rest begins, s; the middle of the recording if it has none."""
+    drive = trial.strain if trial.strain.ndim == 1 else trial.strain[:, 0]
+    still = (np.abs(np.diff(drive)) < 1e-9) & (np.abs(drive[1:]) > 0.02)
+    return trial.time[1 + np.argmax(still)] if still.any() else trial.time[len(drive) // 2]
+
+
+def slip_event(trial: Trial, amount: float, where: float) -> History:
+    """Change of the driven strain: the grip lets go by `amount` at a share `where` of the recording's loaded part."""
+    strain = trial.strain if trial.strain.ndim == 1 else trial.strain[:, 0]
+    loaded = np.flatnonzero(np.abs(strain) > 0.3 * np.abs(strain).max())
+    at = loaded[int(where * (len(loaded) - 1))]
+    after = np.arange(len(trial.time)) >= at
+    return -np.sign(strain[at]) * amount * after
+
+
+def saturated(P: History, amount: float) -> History:
+    """Sensor that clips at (1 - amount) of the largest stress."""
+    limit = (1 - amount) * np.abs(P).max()
+    return np.clip(P, -limit, limit)
+
+
+def stepped(P: History, amount: float) -> History:
+    """Coarse converter: steps of `amount`, Pa."""
+    return amount * np.round(P / amount)
+
+
+def warmed(trial: Trial, P: History, amount: float, period: float, phase: float) -> History:
+    """Stiffness that waxes and wanes with the room's temperature, as a factor on the stress."""
+    t = trial.time + trial.start
+    return P * (1 + amount * np.sin(2 * np.pi * t / period + phase)).reshape(-1, *([1] * (P.ndim - 1)))
+
+
+def rubbing(strain: Float[np.ndarray, "n ..."], amount: float, travel: float) -> History:
+    """Rate-independent hysteresis: a spring that slips at `amount` (Pa) after a `travel` of strain (Jenkins 1922)."""
+    q = np.zeros_like(strain)
+    for i in range(1, len(strain)):
+        q[i] = np.clip(q[i - 1] + amount / travel * (strain[i] - strain[i - 1]), -amount, amount)
+    return q
+
+
+def cured(trial: Trial, P: History, amount: float, time: float) -> History:
+    """Links that form once the specimen is held: stress grows by up to `amount` from the first hold on."""
+    t = np.maximum(trial.time - first_hold(trial), 0)
+    return P * (1 - amount * np.expm1(-t / time)).reshape(-1, *([1] * (P.ndim - 1)))
+
+
+def skipped(trial: Trial, P: History, amount: float, where: float) -> History:
+    """A block of `amount` seconds lost by the force's recorder: what follows is shown too early, the end repeats."""
+    t = trial.time
+    at = t[0] + where * (t[-1] - t[0])
+    source = np.where(t < at, t, np.minimum(t + amount, t[-1]))
+    columns = P.reshape(len(t), -1)
+    return np.stack([np.interp(source, t, c) for c in columns.T], -1).reshape(P.shape)
+
+
+def bent_cell(P: History, amount: float, scale: float) -> History:
+    """Load cell whose reading bends differently pushed and pulled: P + amount P |P| / scale."""
+    return P + amount * P * np.abs(P) / scale
+
+
+def stick_slip(trial: Trial, amount: float, travel: float) -> History:
+    """Sawtooth of `amount` (Pa) over every `travel` of strain while moving, in the sense of the motion."""
+    strain = trial.strain if trial.strain.ndim == 1 else trial.strain[:, 0]
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(strain)))])
+    motion = np.sign(np.gradient(strain))
+    tooth = amount * (np.mod(way / travel, 1.0) - 0.5) * motion
+    return tooth if trial.drive.ndim == 1 else np.stack([tooth, tooth], -1)
+
+
+def spikes(n: int, amount: float, share: float, rng: np.random.Generator) -> Float[np.ndarray, " n"]:
+    """Electrical spikes of either sign and about `amount` (Pa) at a share of the samples."""
+    hit = rng.random(n) < share
+    return hit * rng.normal(0, amount, n)
