@@ -53,14 +53,10 @@ def factor(unit: str, si: str) -> float:
     """
     import pint
 
-    text = unit.strip().replace("µ", "u")
-    if text == "%" and si == "1":
-        return 0.01
     try:
-        given = _registry()(text or "1")
+        given = _registry().Quantity(1.0, _registry().parse_units(unit.strip().replace("µ", "u")))
     except Exception as error:  # pint's parser raises many kinds, tokenize's own among them
         raise unknown(f"unit (wanted is one that converts to {si!r})", unit, KNOWN) from error
-    given = given if isinstance(given, pint.Quantity) else _registry().Quantity(given)
     try:
         wanted = _registry().parse_units("" if si == "1" else si)
         return float(given.to(wanted).magnitude)

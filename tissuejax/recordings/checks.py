@@ -73,6 +73,7 @@ def distinct(recordings: Mapping[str, Recording] | Iterable[tuple[str, Recording
     for label, recording in pairs:
         arrays = {f"inputs {k}": v for k, v in recording.inputs.items()}
         arrays |= {f"channels {k}": c.values for k, c in recording.channels.items()}
+        arrays |= {f"attributes {k}": v for k, v in recording.attributes.items() if k != "start"}
         key = (recording.experiment, *((k, np.asarray(arrays[k]).tobytes()) for k in sorted(arrays)))
         if key in seen:
             raise InputError(

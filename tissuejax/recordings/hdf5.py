@@ -54,7 +54,8 @@ def _with_file(path: Path, label: Path, use: Callable[[h5py.File, Source], objec
     try:
         with h5py.File(path, "r") as file:
             return use(file, Source(label))
-    except (OSError, RuntimeError, KeyError) as error:
+    # h5py tells of damage by many kinds of errors.
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError) as error:
         raise InputError(
             f"{label}: found a file that HDF5 can't read ({error}), expected a whole {Hdf5.name}. "
             "It may be cut short or damaged: copy or export it again."
