@@ -1,6 +1,6 @@
 """A Model: a strain energy plus the effects that are switched on."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import equinox as eqx
 from jaxtyping import Array
@@ -61,7 +61,22 @@ class Model(eqx.Module):
     @property
     def isotropic(self) -> bool:
         """False if the strain energy knows a direction."""
-        return all(getattr(part, "isotropic", True) for part in (self.energy, *self.effects))
+        return all(part.isotropic for part in (self.energy, *self.effects))
+
+    def active(self, values: Mapping[str, float], wanted: Collection[str] = ()) -> "Model":
+        """Without effects whose amplitudes are all exactly zero: they change nothing, to the last bit, and cost nothing.
+
+        Args:
+            values: a number for every path of `declared`.
+            wanted: paths whose effects stay even so, as their derivative is asked for.
+        """
+        kept = tuple(
+            effect
+            for effect in self.effects
+            if any(values[f"effects.{effect.name}.{a}"] != 0 for a in effect.amplitudes)
+            or any(path.startswith(f"effects.{effect.name}.") for path in wanted)
+        )
+        return Model(self.energy, self.volumetric, kept, self.recordings)
 
     def with_effects(self, *effects: Effect) -> "Model":
         """The same base with further effects."""

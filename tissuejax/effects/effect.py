@@ -5,6 +5,7 @@ At its neutral value an effect reproduces the Model without it to the last bit, 
 """
 
 import abc
+import itertools
 from collections.abc import Callable, Mapping
 from typing import ClassVar
 
@@ -30,7 +31,8 @@ class Effect(eqx.Module):
         reveals: what in a recording shows it.
         blind: experiments (or protocols) that can't show it.
         amplitudes: parameters that are 0 at neutral; the others ("shapes") vanish with the effect.
-        grid: for each shape parameter, the values that a diagnosis scans.
+        grid: for each shape parameter, the values that a diagnosis scans; those of a shape in Pa count in initial shear
+            moduli of the base energy, so that one grid serves brain and rubber (`settings` multiplies them out).
         order: place among the effects of a model, whatever the order in which they were added; rig 0, tissue 1,
             damage of tissue before its relaxation (2).
         isotropic: False if the strain energy depends on direction.
@@ -61,6 +63,12 @@ class Effect(eqx.Module):
     def neutral(self) -> dict[str, float]:
         """The values at which the effect is exactly off."""
         return {d.name: 0.0 if d.name in self.amplitudes else d.default for d in self.parameters}
+
+    def settings(self, modulus: float) -> tuple[dict[str, float], ...]:
+        """All combinations of the grid, SI; `modulus` is the base energy's initial shear modulus, Pa."""
+        units = {d.name: d.unit for d in self.parameters}
+        scaled = {k: [v * modulus if units[k] == "Pa" else v for v in values] for k, values in self.grid.items()}
+        return tuple(dict(zip(scaled, combination)) for combination in itertools.product(*scaled.values()))
 
     def stretch(
         self, p: Mapping[str, Array], test: MaterialTest, drive: Float[Array, "n ..."], respond: Respond

@@ -16,6 +16,7 @@ class Energy(eqx.Module):
 
     name: ClassVar[str]
     formula: ClassVar[str]
+    isotropic: ClassVar[bool] = True
     shear_modulus: ClassVar[str]  # at rest, as a formula in the parameters
     source: ClassVar[str]
     valid: ClassVar[str] = "all stretches"

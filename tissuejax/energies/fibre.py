@@ -27,6 +27,7 @@ class WithFibre(Energy):
     formula: ClassVar[str] = "k1/(2 k2) (exp(k2 <E>^2) - 1), E = kappa (I1bar - 3) + (1 - 3 kappa) (I4bar - 1)"
     shear_modulus: ClassVar[str] = "that of the matrix"
     source: ClassVar[str] = "Gasser, Ogden and Holzapfel 2006, eq. 3.5"
+    isotropic: ClassVar[bool] = False
     matrix: Energy
 
     @property

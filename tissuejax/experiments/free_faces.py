@@ -1,16 +1,17 @@
 """Free lateral faces of a specimen: how much it swells and which way it narrows.
 
 An isotropic incompressible specimen needs no search. A compressible one has an unknown volume ratio (P33 = 0), one
-with fibres an unknown ratio of its lateral stretches in a uniaxial test (P22 = 0 as well). Both come from a Newton root find
-at every sample, whose derivative is implicit (optimistix), so that no iteration is differentiated. The faces follow the
-elastic response: where stress relaxes, the lateral shape is that of the instantaneous energy, an error of the order of the
-relaxed share times mu/K, or of the fibres' share of stiffness.
+with fibres an unknown ratio of its lateral stretches in a uniaxial test (P22 = 0 as well). Both come from a Newton
+root find at every sample, whose derivative is implicit (optimistix), so that no iteration is differentiated. The
+faces follow the elastic response: where stress relaxes, the lateral shape is that of the instantaneous energy, an
+error of the order of the relaxed share times mu/K, or times the fibres' share of the stiffness.
 """
 
 from collections.abc import Callable, Mapping
 
 import jax
 import jax.numpy as jnp
+import lineax as lx
 import optimistix as optx
 from jaxtyping import Array, Float
 
@@ -44,30 +45,42 @@ def lateral(
     p = under("volumetric", values)
     uniaxial = 2 * test.swell if test.mode == "extension" else jnp.zeros_like(test.swell)
 
-    def residual(y: tuple[Array, Array], one: Array) -> tuple[Array, Array]:
-        ln_J, skew = y
-        F = deformation(test, one, ln_J, skew)
+    def third_face(ln_J: Array, skew: Array, drive: Array) -> Array:
+        F = deformation(test, drive, ln_J, skew)
+        J = jnp.exp(ln_J)
+        slope = jax.grad(lambda j: jnp.sum(model.volumetric.energy(p, j)))(J)
+        tau = hydrostatic(isochoric(right_cauchy_green(F)).S, F)
+        return (J * slope - tau) / model.volumetric.bulk_modulus(p)
+
+    def second_face(ln_J: Array, skew: Array, drive: Array) -> Array:
+        F = deformation(test, drive, ln_J, skew)
         S = isochoric(right_cauchy_green(F)).S
-        if model.volumetric is None:
-            third = ln_J
-        else:
-            J = jnp.exp(ln_J)
-            slope = jax.grad(lambda j: model.volumetric.energy(p, j))(J)
-            third = (J * slope - hydrostatic(S, F)) / model.volumetric.bulk_modulus(p)
-        if model.isotropic:
-            return third, skew
         across = (S.yy * F.b * F.b - S.zz * F.c * F.c) / shear_modulus
-        return third, uniaxial * across + (1 - uniaxial) * skew
+        return uniaxial * across + (1 - uniaxial) * skew
 
-    def at(one: Array) -> tuple[Array, Array]:
-        nothing = jnp.zeros((), test.time.dtype)
-        solver = optx.Newton(rtol=1e-10, atol=1e-12)
-        found = optx.root_find(residual, solver, (nothing, nothing), one, max_steps=64, throw=False)
-        good = found.result == optx.RESULTS.successful
-        return tuple(jnp.where(good, y, jnp.nan) for y in found.value)
+    if model.isotropic:
+        return _each(lambda y: third_face(y, zero, drive), zero), zero
+    if model.volumetric is None:
+        return zero, _exact_zero(_each(lambda y: second_face(zero, y, drive), zero))
 
-    ln_J, skew = jax.vmap(at)(drive)
+    def both(y: Array, one: Array) -> Array:
+        return jnp.stack([third_face(y[0], y[1], one), second_face(y[0], y[1], one)])
+
+    ln_J, skew = jax.vmap(lambda one: _root(lambda y: both(y, one), jnp.zeros(2, zero.dtype)), out_axes=1)(drive)
     return ln_J, _exact_zero(skew)
+
+
+def _each(residual: Callable[[Array], Array], start: Float[Array, " n"]) -> Float[Array, " n"]:
+    """Roots of n equations of one unknown each: the Jacobian is diagonal, so one derivative along ones is all of it."""
+    return _root(residual, start, frozenset({lx.diagonal_tag}))
+
+
+def _root(residual: Callable[[Array], Array], start: Float[Array, " m"], tags: frozenset = frozenset()) -> Array:
+    """Root of `residual`; entries that don't meet it are NaN."""
+    solver = optx.Newton(rtol=1e-10, atol=1e-12)
+    found = optx.root_find(lambda y, _: residual(y), solver, start, max_steps=64, throw=False, tags=tags)
+    met = jnp.abs(residual(jax.lax.stop_gradient(found.value))) < 1e-7
+    return jnp.where(met, found.value, jnp.nan)
 
 
 def _exact_zero(y: Array) -> Array:

@@ -1,8 +1,8 @@
 """The predictor of material tests: one compiled function for all recordings of like mode and padded length.
 
 Compilation is what costs, so it is shared: the model is static (two models of equal structure are one), everything
-else is an argument, and time series are padded to multiples of 256 samples by repeating the last one. A recording, a sample or a
-multistart later runs the same code.
+else is an argument, and time series are padded to multiples of 256 samples by repeating the last one. The next
+recording, sample or start of a fit runs the same code.
 """
 
 from collections.abc import Mapping, Sequence
@@ -56,33 +56,38 @@ class HomogeneousPredictor(Predictor):
 
     def predict(self, values: Values) -> dict[str, Recording]:
         """Predicted recordings by name; see `Predictor.predict`."""
-        return {
-            name: self._reported(name, _predict(self.model.across(()), _vector(self._local(values, name)), test))
-            for name, test in self.tests.items()
-        }
+        found = {}
+        for name, test in self.tests.items():
+            model, known = self._within(values, name)
+            found[name] = self._reported(name, _predict(model, _vector(known), test))
+        return found
 
     def jacobian(self, values: Values, paths: Sequence[str]) -> tuple[dict[str, Recording], Tangents]:
         """Prediction and derivatives; see `Predictor.jacobian`."""
         for path in paths:
             if path not in self.model.parameters:
                 raise unknown("parameter", path, self.model.parameters)
-        bare = self.model.across(())
-        declared = list(self.model.declared)
         recordings, tangents = {}, {path: {} for path in paths}
         for name, test in self.tests.items():
-            basis = np.zeros((len(paths), len(declared)))
-            for i, path in enumerate(paths):
-                for j, generic in enumerate(declared):
-                    basis[i, j] = path in self.model.source_of(generic, name)
-            stress, slopes = _linearised(bare, _vector(self._local(values, name)), test, basis)
+            model, known = self._within(values, name, paths)
+            basis = np.zeros((len(paths), len(known)))
+            for j, declared in enumerate(known):
+                source = self.model.source_of(declared, name)
+                basis[:, j] = [path in source for path in paths]
+            stress, slopes = _linearised(model, _vector(known), test, basis)
             recordings[name] = self._reported(name, stress)
-            slopes = self._cut(name, jnp.moveaxis(slopes, 1, 0) if _traced(slopes) else np.swapaxes(slopes, 0, 1))
+            slopes = slopes if _traced(slopes) else np.asarray(slopes)
             for i, path in enumerate(paths):
-                tangents[path][name] = {"nominal_stress": slopes[:, i]}
+                tangents[path][name] = {"nominal_stress": self._cut(name, slopes[i])}
         return recordings, tangents
 
-    def _local(self, values: Values, name: str) -> list[Array]:
-        return list(local(self.model, values, name).values())
+    def _within(self, values: Values, name: str, wanted: Sequence[str] = ()) -> tuple[Model, dict[str, Array]]:
+        """The model without effects that are off in recording `name`, and the value of each of its parameters."""
+        known = local(self.model, values, name)
+        model = self.model.across(())
+        if not any(map(_traced, known.values())):
+            model = model.active(known, wanted)
+        return model, {path: known[path] for path in model.declared}
 
     def _cut(self, name: str, padded_series: Array) -> Array:
         """Without padding; on the host where possible, as a slice on the device is compiled for each length."""
@@ -113,13 +118,15 @@ def _predict(model: Model, theta: Float[Array, " p"], test: MaterialTest) -> Flo
 def _linearised(
     model: Model, theta: Float[Array, " p"], test: MaterialTest, basis: Float[Array, "k p"]
 ) -> tuple[Float[Array, "n ..."], Float[Array, "k n ..."]]:
-    """Prediction and its derivative along each row of `basis`; the primal runs once."""
-    stress, along = jax.linearize(lambda x: _predict(model, x, test), theta)
-    return stress, jax.vmap(along)(basis)
+    """Prediction and its derivative along each row of `basis`; vmap leaves the primal single."""
+    return jax.vmap(lambda along: jax.jvp(lambda x: _predict(model, x, test), (theta,), (along,)), out_axes=(None, 0))(
+        basis
+    )
 
 
-def _vector(values: list[Array]) -> Float[Array, " p"]:
+def _vector(known: dict[str, Array]) -> Float[Array, " p"]:
     """One array for all values: on the host unless one of them is traced."""
+    values = list(known.values())
     return jnp.stack([jnp.asarray(v) for v in values]) if any(map(_traced, values)) else np.array(values, float)
 
 

@@ -47,13 +47,12 @@ def right_cauchy_green(F: Gradient) -> Sym:
 
 
 def in_sample(C: Sym, frame: Float[Array, "3 3"]) -> Sym:
-    """C in the sample's own frame, from the test's axes (rows of `frame`)."""
-    full = ((C.xx, C.xy, C.xz), (C.xy, C.yy, C.yz), (C.xz, C.yz, C.zz))
-
-    def entry(i: int, j: int) -> Array:
-        return sum(frame[k, i] * full[k][m] * frame[m, j] for k in range(3) for m in range(3))
-
-    return Sym(entry(0, 0), entry(1, 1), entry(2, 2), entry(0, 1), entry(0, 2), entry(1, 2))
+    """C in the sample's own frame, from the test's axes (rows of `frame`), where it has no shear out of the plane."""
+    first, second, third = frame
+    shear = jnp.outer(first, second) + jnp.outer(second, first)
+    parts = jnp.stack([jnp.outer(first, first), jnp.outer(second, second), jnp.outer(third, third), shear], -1)
+    rows, columns = jnp.array([0, 1, 2, 0, 0, 1]), jnp.array([0, 1, 2, 1, 2, 2])
+    return Sym(*(parts[rows, columns] @ jnp.stack([C.xx, C.yy, C.zz, C.xy]).reshape(4, -1)).reshape(6, *C.xx.shape))
 
 
 def hydrostatic(S: Sym, F: Gradient) -> Float[Array, "..."]:

@@ -1,0 +1,35 @@
+"""Aging: stiffness that drifts with the time since the sample's first recording (thawing, drying, decay)."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from tissuejax.effects.effect import Effect
+from tissuejax.effects.material_test import MaterialTest, Stress
+from tissuejax.parameters import Parameter
+
+
+class Aging(Effect):
+    """S = exp(rate T) S_e, T the time since the first recording: `start` of the recording plus its own time.
+
+    Revealed by later recordings that are stiffer or softer than earlier ones of the same kind. Blind: a single short
+    recording, and recordings without `start` (only the drift inside each is then seen).
+    Source: first-order drift of the modulus; the exponential keeps stiffness positive.
+    """
+
+    name: ClassVar[str] = "aging"
+    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    reveals: ClassVar[str] = "later recordings stiffer or softer than earlier ones"
+    blind: ClassVar[str] = "a single short recording"
+    source: ClassVar[str] = "first-order drift of the modulus"
+    amplitudes: ClassVar[tuple[str, ...]] = ("rate",)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        meaning = "relative change of stiffness a second"
+        return (Parameter("rate", "1/s", 0.0, lower=-1.0, upper=1.0, scale=1e-4, meaning=meaning),)
+
+    def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:
+        return state.scaled(jnp.exp(p["rate"] * (test.start + test.elapsed)))

@@ -1,0 +1,56 @@
+"""Anisotropy: one family of fibres in a direction that is not known beforehand."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from tissuejax.effects.effect import Effect
+from tissuejax.energies.barrier import expm1
+from tissuejax.energies.strain import Strain
+from tissuejax.parameters import Parameter
+
+
+class Anisotropy(Effect):
+    """psi = k1/(2 k2) (exp(k2 E^2) - 1), E = I4bar - 1, I4bar the squared isochoric stretch of the fibres.
+
+    Direction in the sample's frame: `angle` from x towards y, `elevation` from that plane towards z. Shortened fibres
+    carry the share `compression` of what they would (0: tension only, the usual assumption; not fitted unless named).
+
+    Revealed by different stiffness of specimens cut, or stretched, along different directions. Blind: recordings in one
+    direction, or without a `direction`, unless biaxial.
+    Source: Holzapfel, Gasser and Ogden 2000, J. Elasticity 61, eq. 65.
+    """
+
+    name: ClassVar[str] = "anisotropy"
+    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    reveals: ClassVar[str] = "stiffness that differs between directions"
+    blind: ClassVar[str] = "uniaxial recordings in a single direction"
+    source: ClassVar[str] = "Holzapfel, Gasser and Ogden 2000, eq. 65"
+    isotropic: ClassVar[bool] = False
+    amplitudes: ClassVar[tuple[str, ...]] = ("k1",)
+    grid: ClassVar[Mapping[str, tuple[float, ...]]] = {
+        "k2": (1.0,),
+        "angle": (0.0, np.pi / 4, np.pi / 2, 3 * np.pi / 4),
+        "elevation": (0.0, np.pi / 4, np.pi / 2),
+    }
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (
+            Parameter("k1", "Pa", 0.0, lower=0.0, scale=100.0, meaning="stiffness of the fibres"),
+            Parameter("k2", "1", 1.0, lower=1e-3, upper=1e3, meaning="stiffening of the fibres"),
+            Parameter("angle", "rad", 0.0, lower=-7.0, upper=7.0, scale=0.3, meaning="of the fibres, from x to y"),
+            Parameter("elevation", "rad", 0.0, lower=-7.0, upper=7.0, scale=0.3, meaning="of the fibres, towards z"),
+            Parameter("compression", "1", 0.0, lower=0.0, upper=1.0, frozen=True, meaning="share when shortened"),
+        )
+
+    def energy(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+        C, level = strain.C, jnp.cos(p["elevation"])
+        x, y, z = level * jnp.cos(p["angle"]), level * jnp.sin(p["angle"]), jnp.sin(p["elevation"])
+        along = x * x * C.xx + y * y * C.yy + z * z * C.zz + 2 * (x * y * C.xy + x * z * C.xz + y * z * C.yz)
+        E = strain.J ** (-2 / 3) * along - 1
+        squared = jnp.where(E > 0, E * E, p["compression"] * E * E)
+        return 0.5 * p["k1"] / p["k2"] * expm1(p["k2"] * squared)

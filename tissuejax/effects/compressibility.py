@@ -1,0 +1,45 @@
+"""Compressibility: the tissue gives way to pressure, at once or as fluid drains out of it."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from jaxtyping import Array, Float
+
+from tissuejax.effects.effect import Effect
+from tissuejax.effects.history import fading
+from tissuejax.effects.material_test import MaterialTest
+from tissuejax.parameters import Parameter
+
+
+class Compressibility(Effect):
+    """ln J = immediate sigma_m + drained (sigma_m - h), h the past of the mean stress fading with `time`.
+
+    sigma_m is the mean Cauchy stress, `immediate` is 1/K at once, `drained` the further compressibility once the
+    fluid has come to rest (one exponential: the slowest mode of consolidation). It adds to the base's own volumetric
+    energy.
+
+    Revealed by uniaxial and planar tests that disagree, and by relaxation in tests with free sides that is missing in
+    shear. Blind: simple shear of an energy in I1 alone, and uniaxial tests alone (1/K is then taken up by the
+    stiffness).
+    Source: Mow et al. 1980, J. Biomech. Eng. 102 (biphasic relaxation), here in one mode; Holzapfel 2000, sec. 6.4.
+    """
+
+    name: ClassVar[str] = "compressibility"
+    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    reveals: ClassVar[str] = "disagreement between tests of unlike constraint, relaxation that is absent in shear"
+    blind: ClassVar[str] = "simple shear; uniaxial tests alone"
+    source: ClassVar[str] = "Mow et al. 1980; Holzapfel 2000, sec. 6.4"
+    amplitudes: ClassVar[tuple[str, ...]] = ("immediate", "drained")
+    grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"time": (1.0, 5.0, 25.0)}
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (
+            Parameter("immediate", "1/Pa", 0.0, lower=0.0, upper=1.0, scale=1e-5, meaning="1/K at once"),
+            Parameter("drained", "1/Pa", 0.0, lower=0.0, upper=1.0, scale=1e-5, meaning="further 1/K after draining"),
+            Parameter("time", "s", 10.0, lower=1e-3, upper=1e6, meaning="time of draining"),
+        )
+
+    def volume(self, p: Mapping[str, Array], test: MaterialTest, mean: Float[Array, " n"]) -> Float[Array, " n"]:
+        undrained = fading(test.time, mean[:, None], p["time"])[:, 0]
+        return p["immediate"] * mean + p["drained"] * (mean - undrained)

@@ -1,0 +1,50 @@
+"""Machine compliance: the rig between sensor and tissue gives way under load."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from tissuejax.effects.effect import Effect, Respond
+from tissuejax.effects.material_test import MaterialTest
+from tissuejax.parameters import Parameter
+
+
+class MachineCompliance(Effect):
+    """Specimen's stretch x solves x + compliance (area/height) P(x) = recorded stretch, P its nominal stress.
+
+    Force is P area and the rig's displacement compliance times force, a share of the height. Solved by four Newton
+    steps with the slope of P under a shift of the whole history (exact for an elastic specimen). An unknown area or
+    height counts as a cube of 1 cm edge.
+
+    Revealed by stiffness that falls with load, alike in tension and compression, and by specimens of unlike size that
+    disagree. Blind: one specimen in one mode: it then looks like another energy (or slack).
+    Source: Kalidindi, Abusafieh and El-Danaf 1997, Exp. Mech. 37 (compliance of test machines).
+    """
+
+    name: ClassVar[str] = "machine-compliance"
+    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    reveals: ClassVar[str] = "apparent stiffness that falls with load; specimens of unlike size disagree"
+    blind: ClassVar[str] = "one specimen in one mode"
+    source: ClassVar[str] = "Kalidindi, Abusafieh and El-Danaf 1997"
+    order: ClassVar[int] = 0
+    amplitudes: ClassVar[tuple[str, ...]] = ("compliance",)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        meaning = "displacement of the rig a newton"
+        return (Parameter("compliance", "m/N", 0.0, lower=0.0, upper=10.0, scale=1e-3, meaning=meaning),)
+
+    def stretch(
+        self, p: Mapping[str, Array], test: MaterialTest, drive: Float[Array, "n ..."], respond: Respond
+    ) -> Float[Array, "n ..."]:
+        ratio = test.area / test.height
+        share = p["compliance"] * jnp.where(jnp.isnan(ratio), 0.01, ratio)
+
+        def newton(x: Array, _: None) -> tuple[Array, None]:
+            stress, slope = jax.jvp(respond, (x,), (jnp.ones_like(x),))
+            return x - (x + share * stress - drive) / (1 + share * slope), None
+
+        return jax.lax.scan(newton, drive, None, length=4)[0]

@@ -1,0 +1,71 @@
+"""A nonlinear Maxwell element: the faster it flows, the more it is loaded."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import diffrax
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from tissuejax.effects.effect import Effect
+from tissuejax.effects.material_test import MaterialTest, Stress
+from tissuejax.parameters import Parameter
+
+
+class NonlinearViscosity(Effect):
+    """S = S_e - g z, dz/dt = (S_e - z)/tau (1 + |S_e - z|^2/stress^2)^((exponent - 1)/2), z = 0 stress flowed away.
+
+    One Maxwell element on the isochoric PK2 stress whose fluidity grows with its own load as a power law, as in the
+    flow rule of Bergstrom and Boyce; exponent 1 is a Prony term with g and tau. The energy's moduli are instantaneous.
+    z starts at the first sample's stress: rested tissue. Integrated by diffrax (Tsit5, adaptive).
+
+    Revealed by relaxation that is quicker from a larger strain, and by hysteresis nearly independent of rate.
+    Blind: one ramp at constant rate; at one amplitude and rate it is a Prony series.
+    Source: Bergstrom and Boyce 1998, J. Mech. Phys. Solids 46 (power-law flow), here with a linear foot.
+    """
+
+    name: ClassVar[str] = "nonlinear-viscosity"
+    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous"})
+    reveals: ClassVar[str] = "relaxation that is quicker from larger strain, hysteresis at every rate"
+    blind: ClassVar[str] = "a single ramp at constant rate"
+    source: ClassVar[str] = "Bergstrom and Boyce 1998, eq. 22"
+    order: ClassVar[int] = 2
+    amplitudes: ClassVar[tuple[str, ...]] = ("g",)
+    grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"tau": (1.0, 10.0), "stress": (0.2,), "exponent": (3.0,)}
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (
+            Parameter("g", "1", 0.0, lower=0.0, upper=1.0, scale=0.1, meaning="share that flows"),
+            Parameter("tau", "s", 5.0, lower=1e-3, upper=1e6, meaning="relaxation time under small load"),
+            Parameter("stress", "Pa", 200.0, lower=1e-3, upper=1e12, meaning="load at which flow quickens"),
+            Parameter("exponent", "1", 3.0, lower=1.0, upper=20.0, meaning="power of flow in load"),
+        )
+
+    def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:
+        s = state.stacked()
+        scaled = s / p["stress"]
+        n = len(test.time)
+        # Repeated times (padding) are set apart by a billionth of a step, so that interpolation is defined.
+        time = test.elapsed * (1 + 1e-9) + jnp.arange(n) * (1e-9 * test.elapsed[-1] / n)
+        past = diffrax.LinearInterpolation(time, scaled)
+        norm = jnp.array([1.0, 1.0, 1.0, 2.0], s.dtype)  # the shear component counts twice in S : S
+
+        def flow(t, z, _):
+            load = past.evaluate(t) - z
+            return load / p["tau"] * (1 + load @ (norm * load)) ** ((p["exponent"] - 1) / 2)
+
+        solution = diffrax.diffeqsolve(
+            diffrax.ODETerm(flow),
+            diffrax.Tsit5(),
+            time[0],
+            time[-1],
+            None,
+            scaled[0],
+            saveat=diffrax.SaveAt(ts=time),
+            stepsize_controller=diffrax.PIDController(rtol=1e-6, atol=1e-7),
+            adjoint=diffrax.DirectAdjoint(),
+            max_steps=4096,
+            throw=False,
+        )
+        return state.replaced(s - p["g"] * (solution.ys * p["stress"]))

@@ -1,0 +1,52 @@
+"""Periodic load: breathing, pulse or mains hum in the force channel."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from tissuejax.effects.effect import Effect
+from tissuejax.effects.material_test import MaterialTest
+from tissuejax.parameters import Parameter
+
+
+class Periodic(Effect):
+    """Reported stress = stress + sin a(t) `sin` + cos a(t) `cos`, a = 2 pi frequency t.
+
+    With `separate` (the default) every recording has its own phase and strength, t counted from its beginning;
+    otherwise one oscillation runs through all recordings, t counted from the first (it needs `start`).
+
+    Revealed by a line in the periodogram of the residual, also at rest. Blind: recordings shorter than a period. The
+    grid is one frequency a decade fraction; a periodogram of the residual is the better start.
+    Source: harmonic model; Lomb 1976, Astrophys. Space Sci. 39.
+    """
+
+    name: ClassVar[str] = "periodic"
+    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    reveals: ClassVar[str] = "a line in the periodogram of the residual"
+    blind: ClassVar[str] = "recordings shorter than a period"
+    source: ClassVar[str] = "Lomb 1976"
+    order: ClassVar[int] = 0
+    amplitudes: ClassVar[tuple[str, ...]] = ("sin", "cos")
+    grid: ClassVar[Mapping[str, tuple[float, ...]]] = {
+        "frequency": tuple(float(f) for f in np.concatenate([np.arange(0.06, 0.6, 0.02), np.arange(0.6, 3.0, 0.04)]))
+    }
+    separate: bool = True
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        each = self.separate
+        return (
+            Parameter("sin", "Pa", 0.0, scale=10.0, each=each, meaning="sine part of the load"),
+            Parameter("cos", "Pa", 0.0, scale=10.0, each=each, meaning="cosine part of the load"),
+            Parameter("frequency", "1/s", 0.25, lower=1e-4, upper=1e4, meaning="of the load"),
+        )
+
+    def stress(
+        self, p: Mapping[str, Array], test: MaterialTest, stress: Float[Array, "n ..."]
+    ) -> Float[Array, "n ..."]:
+        angle = 2 * jnp.pi * p["frequency"] * (test.elapsed if self.separate else test.start + test.elapsed)
+        load = p["sin"] * jnp.sin(angle) + p["cos"] * jnp.cos(angle)
+        return stress + (load if stress.ndim == 1 else load[:, None])

@@ -1,0 +1,42 @@
+"""Permanent set: tissue that has been strained stays a little longer (or shorter) than it was."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from tissuejax.effects.effect import Effect, Respond
+from tissuejax.effects.history import running_peak
+from tissuejax.effects.material_test import MaterialTest
+from tissuejax.parameters import Parameter
+
+
+class PermanentSet(Effect):
+    """Elastic strain = strain - amount (largest + smallest strain so far), strain being stretch - 1 or shear.
+
+    The stress-free length follows the extremes of the past, in tension and in compression alike.
+
+    Revealed by stress of the opposite sign when the specimen is brought back to its first length, and by a shifted
+    origin in later cycles. Blind: monotonic loading (the amount is then taken up by the stiffness).
+    Source: Mullins 1969, Rubber Chem. Technol. 42; Diani, Fayolle and Gilormini 2009, Eur. Polym. J. 45, sec. 2.
+    """
+
+    name: ClassVar[str] = "permanent-set"
+    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous"})
+    reveals: ClassVar[str] = "stress of the opposite sign at the first length, shifted origin in later cycles"
+    blind: ClassVar[str] = "monotonic loading"
+    source: ClassVar[str] = "Mullins 1969; Diani, Fayolle and Gilormini 2009"
+    amplitudes: ClassVar[tuple[str, ...]] = ("amount",)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        meaning = "share of the largest past strain that stays"
+        return (Parameter("amount", "1", 0.0, lower=0.0, upper=0.9, scale=0.05, meaning=meaning),)
+
+    def stretch(
+        self, p: Mapping[str, Array], test: MaterialTest, drive: Float[Array, "n ..."], respond: Respond
+    ) -> Float[Array, "n ..."]:
+        strain = drive - test.rest
+        extremes = running_peak(jnp.maximum(strain, 0.0)) - running_peak(jnp.maximum(-strain, 0.0))
+        return drive - p["amount"] * extremes

@@ -1,0 +1,41 @@
+"""Slack: play in the grips that is taken up before the specimen feels the load."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from tissuejax.effects.effect import Effect, Respond
+from tissuejax.effects.material_test import MaterialTest
+from tissuejax.parameters import Parameter
+
+
+class Slack(Effect):
+    """Specimen's strain is the recorded one short of `gap`, to the side of its sign, and zero inside the gap.
+
+    strain is stretch - 1 or shear; play acts in tension and in compression alike.
+
+    Revealed by no load around rest and a sharp onset. Blind: recordings that start beyond the gap (it is then an offset
+    of the stretch). Source: ASTM D882, toe compensation.
+    """
+
+    name: ClassVar[str] = "slack"
+    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous"})
+    reveals: ClassVar[str] = "no load around rest, then a sharp onset"
+    blind: ClassVar[str] = "recordings that start beyond the gap"
+    source: ClassVar[str] = "ASTM D882, toe compensation"
+    order: ClassVar[int] = 0
+    amplitudes: ClassVar[tuple[str, ...]] = ("gap",)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        meaning = "strain before the specimen is loaded"
+        return (Parameter("gap", "1", 0.0, lower=0.0, upper=0.5, scale=0.01, meaning=meaning),)
+
+    def stretch(
+        self, p: Mapping[str, Array], test: MaterialTest, drive: Float[Array, "n ..."], respond: Respond
+    ) -> Float[Array, "n ..."]:
+        strain = drive - test.rest
+        # Subtracted from the drive, not added to rest, so that no gap changes no bit.
+        return drive - jnp.sign(strain) * jnp.minimum(jnp.abs(strain), p["gap"])

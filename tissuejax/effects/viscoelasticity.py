@@ -1,0 +1,78 @@
+"""Finite linear viscoelasticity: a Prony series on the isochoric stress."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from tissuejax.effects.effect import Effect
+from tissuejax.effects.history import fading
+from tissuejax.effects.material_test import MaterialTest, Stress
+from tissuejax.parameters import Parameter
+
+
+class Viscoelasticity(Effect):
+    """S(t) = S_e(t) - sum_i g_i (S_e - h_i), h_i the past of S_e fading with tau_i (quasi-linear viscoelasticity).
+
+    S_e is the elastic isochoric PK2 stress. The energy's moduli are INSTANTANEOUS ones; the long-term stress is (1 -
+    sum_i g_i) of it (`long_term`). A recording starts from rested tissue. `terms` relaxation times lie, to start
+    with, in equal parts of the decades from `shortest` to `longest` seconds.
+
+    Revealed by force falling during holds, by hysteresis between loading and unloading, by stiffness rising with rate.
+    Blind: one monotonic ramp at constant rate (it looks like another energy). Inseparable from softening in a single
+    cycle without a hold. Source: Fung 1993, sec. 7.6; Simo and Hughes 1998, sec. 10.3.
+    """
+
+    name: ClassVar[str] = "viscoelasticity"
+    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    reveals: ClassVar[str] = "relaxation during holds, hysteresis, stiffness that rises with rate"
+    blind: ClassVar[str] = "a single ramp at constant rate"
+    source: ClassVar[str] = "Fung 1993, sec. 7.6; Simo and Hughes 1998, sec. 10.3"
+    order: ClassVar[int] = 2
+    terms: int = 2
+    shortest: float = 0.1
+    longest: float = 100.0
+
+    @property
+    def amplitudes(self) -> tuple[str, ...]:
+        """g1 ... gN."""
+        return tuple(f"g{i}" for i in self._numbers)
+
+    @property
+    def grid(self) -> dict[str, tuple[float, ...]]:
+        """Two to three times in each term's part of the decades, so that terms keep their order."""
+        edges = np.geomspace(self.shortest, self.longest, self.terms + 1)
+        return {
+            f"tau{i}": tuple(float(t) for t in np.geomspace(low, high, 7)[1::2])
+            for i, low, high in zip(self._numbers, edges[:-1], edges[1:])
+        }
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        edges = np.geomspace(self.shortest, self.longest, self.terms + 1)
+        times = np.sqrt(edges[:-1] * edges[1:])
+        return tuple(
+            Parameter(f"g{i}", "1", 0.0, lower=0.0, upper=1.0, scale=0.1, meaning=f"share that relaxes with tau{i}")
+            for i in self._numbers
+        ) + tuple(
+            Parameter(f"tau{i}", "s", float(t), lower=1e-4, upper=1e7, meaning=f"relaxation time {i}")
+            for i, t in zip(self._numbers, times)
+        )
+
+    @property
+    def _numbers(self) -> range:
+        return range(1, self.terms + 1)
+
+    def long_term(self, p: Mapping[str, Array]) -> Array:
+        """Long-term over instantaneous stiffness, 1 - sum g_i."""
+        return 1 - sum(p[f"g{i}"] for i in self._numbers)
+
+    def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:
+        s = state.stacked()
+        g = jnp.stack([jnp.asarray(p[f"g{i}"]) for i in self._numbers])
+        tau = jnp.stack([jnp.asarray(p[f"tau{i}"]) for i in self._numbers])
+        h = jax.vmap(lambda t: fading(test.time, s, t))(tau)
+        return state.replaced(s - jnp.tensordot(g, s - h, 1))
