@@ -40,7 +40,7 @@ def prony_strained(
     tau: list[float],
     b: float,
 ) -> History:
-    """As `prony`, with relaxation times tau_i exp(b |strain|): slower (b > 0) or faster (b < 0) the further stretched."""
+    """As `prony`, with relaxation times tau_i exp(b |strain|): slower the further stretched for b > 0."""
     out = (1 - sum(g)) * s
     dt = np.diff(time)
     middle = np.abs(strain[1:] + strain[:-1]) / 2

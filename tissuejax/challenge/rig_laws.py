@@ -89,7 +89,8 @@ def aging_factor(trial: Trial, kind: str, amount: float, time: float) -> Float[n
 
 
 def drift(trial: Trial, kind: str, offset: float, rate: float) -> Float[np.ndarray, " n"]:
-    """Force channel's zero, Pa. kind: "linear" offset + rate t in each recording; "warming" offset + rate (1 - exp(-t/8 s)) 8 s."""
+    """Force channel's zero, Pa, by t from each recording's begin. kind: "linear" offset + rate t; "warming" offset +
+    rate (1 - exp(-t / 8 s)) 8 s."""
     t = trial.time - trial.time[0]
     return offset + rate * (8 * -np.expm1(-t / 8) if kind == "warming" else t)
 

@@ -1,0 +1,91 @@
+"""Make a challenge: cases from a seed, their keys sealed, and the hash of the keys in the manifest before any run."""
+
+import json
+import os
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+
+from tissuejax.challenge import files, material_cases
+from tissuejax.errors import InputError, unknown
+from tissuejax.progress import Progress, Silent
+from tissuejax.storage import write_json
+
+KINDS = ("material", "probing")
+
+
+def make(
+    out: str | os.PathLike,
+    kind: str = "material",
+    count: int = 200,
+    seed: int = 1,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> dict:
+    """Make `count` cases and return the manifest.
+
+    Args:
+        out: folder of the challenge.
+        kind: "material" or "probing".
+        count: number of cases.
+        seed: the same seed gives the same cases; another one, others.
+        jobs: processes.
+
+    Raises:
+        InputError: unknown kind, a count below one, or a folder that holds another challenge already.
+    """
+    out = Path(out)
+    if kind not in KINDS:
+        raise unknown("kind of challenge", kind, KINDS)
+    if count < 1 or jobs < 1:
+        raise InputError(f"count {count}, jobs {jobs}: both must be 1 or more")
+    plan = {"version": 1, "kind": kind, "count": count, "seed": seed}
+    if (out / "manifest.json").exists():
+        manifest = files.read_manifest(out)
+        if {k: manifest[k] for k in plan} != plan:
+            raise InputError(f"{out} holds another challenge already; name an empty folder, or remove that one")
+        return manifest
+    case = partial(_material, out, seed) if kind == "material" else partial(_probing, out, seed)
+    entries, keys = {}, {}
+    with (progress or Silent()).stage(f"making {count} {kind} cases", total=count) as stage:
+        for name, energy, key in _each(case, count, jobs):
+            entries[name] = {"name": name, "energy": energy}
+            keys[name] = key
+            stage.advance(note=name)
+    for name, entry in entries.items():
+        entry["sha256"] = files.sha256(out / "cases" / f"{name}.h5")
+    sealed = write_json(out / "sealed" / "keys.json", {name: keys[name] for name in sorted(keys)})
+    manifest = plan | {"keys_sha256": files.sha256(sealed), "cases": [entries[name] for name in sorted(entries)]}
+    write_json(out / "manifest.json", manifest)
+    return manifest
+
+
+def _each(case, count: int, jobs: int):
+    if jobs == 1:
+        yield from map(case, range(count))
+        return
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        for done in as_completed([pool.submit(case, i) for i in range(count)]):
+            yield done.result()
+
+
+def _material(out: Path, seed: int, index: int) -> tuple[str, str, dict]:
+    name = f"m{index:03d}"
+    case = material_cases.draw(name, seed, index)
+    files.write_material(case, out / "cases" / f"{name}.h5")
+    return name, case.energy, case.key
+
+
+def _probing(out: Path, seed: int, index: int) -> tuple[str, str, dict]:
+    from tissuejax.challenge import probing_cases
+
+    name = f"p{index:03d}"
+    kept = out / "sealed" / "parts" / f"{name}.json"
+    path = out / "cases" / f"{name}.h5"
+    if not (kept.exists() and path.exists()):  # minutes each: what an interrupted run made is kept
+        case = probing_cases.draw(name, seed, index)
+        probing_cases.write(case, path)
+        write_json(kept, {"energy": case.energy, "key": case.key})
+    part = json.loads(kept.read_text())
+    return name, part["energy"], part["key"]

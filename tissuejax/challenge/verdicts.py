@@ -1,0 +1,121 @@
+"""One case's answer held against its key: what was right, what was wrong, and the error on the held-out recording."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Mark:
+    """How one case was answered.
+
+    Attributes:
+        name, category: the case.
+        truth: effects in it (outside the catalogue for "unknown").
+        verdict, named: the answer and the effects it added, in order.
+        alternatives: names offered instead.
+        size: of the weakest effect, rms over noise after a refit of the base; nan for none.
+        plain: all laws like the catalogue's.
+        correlated: serially correlated noise.
+        first: the first named effect is in it.
+        exact: all effects named and no other (effects said to be tolerated aside).
+        all_named: all effects named, whatever else.
+        open_right: exact, or ambiguous with the truth among what was offered.
+        right: what this category asks for: nothing, the exact set, or abstention.
+        held_out_ratio: rms error on the held-out recording over that of the truth itself; nan if not reported.
+        confidence: as stated, or nan.
+        seconds: wall time.
+    """
+
+    name: str
+    category: str
+    truth: tuple[str, ...]
+    verdict: str
+    named: tuple[str, ...]
+    alternatives: tuple[str, ...]
+    size: float
+    plain: bool
+    correlated: bool
+    first: bool
+    exact: bool
+    all_named: bool
+    open_right: bool
+    right: bool
+    held_out_ratio: float
+    confidence: float
+    seconds: float
+
+
+def names_in(found: object) -> tuple[str, ...]:
+    """Effect names in a list of names, of {"name": ...} or of lists of either, flattened in order, each once."""
+    if isinstance(found, str):
+        return tuple(p.strip() for p in found.split("+"))
+    if isinstance(found, dict):
+        inner = found.get("name", found.get("effects", found.get("names", ())))
+        return names_in(inner)
+    flat = [name for item in (found or ()) for name in names_in(item)]
+    return tuple(dict.fromkeys(flat))
+
+
+def held_out_ratio(key: dict, result: dict) -> float:
+    """Rms error of the repaired model on the held-out recording over that of the model that is the truth.
+
+    Channels are pooled in units of their noise, by `chi2_per_sample` of the result's "after".
+    """
+    name = key["held_out"]
+    after = (result.get("after") or {}).get(name) or {}
+    truth = key["truth_error_over_noise"][name]
+    pairs = []
+    for channel, numbers in after.items():
+        if not isinstance(numbers, dict) or numbers.get("chi2_per_sample") is None:
+            continue
+        known = truth.get(channel) if isinstance(truth, dict) else truth
+        if known:
+            pairs.append((numbers["chi2_per_sample"], known**2))
+    if not pairs:
+        return math.nan
+    return float(np.sqrt(sum(a for a, _ in pairs) / sum(b for _, b in pairs)))
+
+
+def mark(name: str, key: dict, result: dict, seconds: float = math.nan) -> Mark:
+    """Compare an answer with the key."""
+    category, truth = key["category"], tuple(key["effects"])
+    named = names_in(result.get("effects"))
+    offered = names_in(result.get("alternatives"))
+    verdict = str(result.get("verdict"))
+    tolerated = set(key.get("tolerated", ()))
+    counted = set(named) - (tolerated - set(truth))
+    settled = verdict in ("found", "ambiguous")
+    exact = settled and counted == set(truth) and bool(truth)
+    ambiguous = verdict == "ambiguous" and bool(truth) and set(truth) <= counted | set(offered)
+    if category == "none":
+        right = verdict == "nothing-missing"
+    elif category == "unknown":
+        right = verdict == "unexplained"
+    else:
+        right = exact
+    sizes = [s for s in key["size_over_noise"].values() if s is not None]
+    return Mark(
+        name=name,
+        category=category,
+        truth=truth,
+        verdict=verdict,
+        named=named,
+        alternatives=offered,
+        size=min(sizes) if sizes else math.nan,
+        plain=all(key.get("plain", {}).values()),
+        correlated=key.get("noise", {}).get("correlation", 0.0) > 0,
+        first=settled and bool(named) and named[0] in truth,
+        exact=exact,
+        all_named=settled and bool(truth) and set(truth) <= set(named),
+        open_right=exact or ambiguous,
+        right=right,
+        held_out_ratio=held_out_ratio(key, result),
+        confidence=_number(result.get("confidence")),
+        seconds=seconds,
+    )
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, int | float) else math.nan
