@@ -1,4 +1,4 @@
-"""From a mesh, a material and a probe path to a `Scene`: the choices that are made once, on the host, with their reasons.
+"""From a mesh, a material and a probe path to a `Scene`: the choices that are made once, on the host.
 
 Step: `SAFETY` times the critical step at the given parameters (give the stiffest ones that a fit may visit). Penalty:
 `GRIP` times the wave modulus over the facet size, which keeps penetration near a thousandth of the probe's radius.
@@ -166,8 +166,8 @@ def _interval(times):
     if len(times) < 2 or not (gaps > 0).all() or np.ptp(gaps) > 1e-3 * gaps.mean():
         raise InputError(
             f"output times: {len(times)} values with gaps from {gaps.min() if len(gaps) else 0:.3g} to "
-            f"{gaps.max() if len(gaps) else 0:.3g} s; at least two uniform, increasing times are needed (take a uniform "
-            "grid and `sample` the result at the sensor's own times)"
+            f"{gaps.max() if len(gaps) else 0:.3g} s; at least two uniform, increasing times are needed (take a "
+            "uniform grid and `sample` the result at the sensor's own times)"
         )
     return (times[-1] - times[0]) / (len(times) - 1)
 
@@ -226,8 +226,8 @@ def _refuse_inside(made: Probe, points, start):
     deep = -_distance(made.shape, x - position).min()
     if deep > 20 * float(made.softness):
         raise InputError(
-            f"the probe starts {1e3 * deep:.2f} mm inside the tissue at t = {start:.4g} s; start the path out of contact "
-            "or check mesh, offset and units"
+            f"the probe starts {1e3 * deep:.2f} mm inside the tissue at t = {start:.4g} s; start the path out of "
+            "contact, or check mesh, offset and units"
         )
 
 

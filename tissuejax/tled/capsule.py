@@ -1,7 +1,7 @@
 """A thin elastic skin on the surface of the organ: an incompressible neo-Hookean membrane on the boundary facets.
 
-Energy per reference area (c/2) (tr M + 1/det M - 3), M = G0^-1 G with the metrics G0, G of the facet's mid-point before and
-after; c is shear modulus times thickness, N/m. Forces are its gradient. (Plane stress: Holzapfel 2000, 6.5.)
+Energy per reference area (c/2) (tr M + 1/det M - 3), M = G0^-1 G with the metrics G0, G of the facet's mid-point before
+and after; c is shear modulus times thickness, N/m. Forces are its gradient. (Plane stress: Holzapfel 2000, 6.5.)
 """
 
 from typing import NamedTuple

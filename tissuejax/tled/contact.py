@@ -73,9 +73,9 @@ class Touch(NamedTuple):
 def places(patch: Patch, u: Float[Array, "3 N"], centre: Float[Array, " 3"], shape: np.ndarray):
     """Contact points relative to the probe's reference point, three arrays (q, P)."""
     x = patch.x + u.at[:, patch.nodes].get(mode="promise_in_bounds")
-    corners = shape.shape[1]
-    weights = [jnp.asarray(shape[:, a : a + 1], x.dtype) for a in range(corners)]
-    return tuple(sum(weights[a] * x[i, a] for a in range(corners)) - centre[i] for i in range(3))
+    weights = jnp.asarray(shape, x.dtype)[:, :, None]
+    at = sum(weights[:, a] * x[:, None, a] for a in range(shape.shape[1])) - centre[:, None, None]
+    return tuple(barrier(at))
 
 
 def _softplus(z):
@@ -85,7 +85,7 @@ def _softplus(z):
 def forces(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Array, " 3"], grip: Grip) -> Touch:
     """Contact forces with the probe's reference point at `centre`."""
     shape, _ = quadrature(patch.nodes.shape[0])
-    x = barrier(places(patch, u, centre, shape))
+    x = places(patch, u, centre, shape)
     gap, normal = probe.shape.distance(x)
     pressure = probe.penalty * probe.softness * _softplus(-gap / probe.softness)
     push, bond = pressure, grip.bond
@@ -98,16 +98,14 @@ def forces(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Arr
     if probe.friction is not None:
         drag, anchor = _friction(probe, x, normal, pressure, anchor)
         traction = tuple(t + d for t, d in zip(traction, drag, strict=True))
-    f = barrier(tuple(t * probe.area for t in traction))
-    total = jnp.stack([jnp.sum(c) for c in f])
-    torque = jnp.stack([jnp.sum(x[(i + 1) % 3] * f[(i + 2) % 3] - x[(i + 2) % 3] * f[(i + 1) % 3]) for i in range(3)])
-    at_nodes = jnp.stack([jnp.stack([_spread(shape[:, a], c) for a in range(shape.shape[1])]) for c in f])
+    f = barrier(jnp.stack(traction) * probe.area)  # (3, q, P)
+    arm = barrier(jnp.stack(x))
+    total = jnp.sum(f, (1, 2))
+    torque = jnp.sum(jnp.roll(arm, -1, 0) * jnp.roll(f, 1, 0) - jnp.roll(arm, 1, 0) * jnp.roll(f, -1, 0), (1, 2))
+    weights = jnp.asarray(shape, f.dtype)[:, :, None]
+    at_nodes = barrier(sum(weights[q] * f[:, q][:, None] for q in range(shape.shape[0])))
     nodal = jnp.zeros_like(u).at[:, patch.nodes].add(at_nodes, mode="promise_in_bounds")
     return Touch(nodal, -total, -torque, Grip(anchor, bond))
-
-
-def _spread(weights, f):
-    return sum(float(w) * f[q] for q, w in enumerate(weights))
 
 
 def _friction(probe, x, normal, pressure, anchor):

@@ -123,7 +123,7 @@ def second_piola(g: Sym) -> tuple:
 
 
 def isochoric(scene: Scene, mesh: Mesh, C: Sym):
-    """Isochoric energy (E,) and second Piola-Kirchhoff stress (six arrays) without memory, stiffness factor included."""
+    """Isochoric energy (E,) and second Piola-Kirchhoff stress (six arrays), no memory, stiffness factor included."""
 
     def total(C):
         psi = mesh.stiffness * _isochoric_energy(scene, Strain.of(C))

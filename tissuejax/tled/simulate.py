@@ -88,12 +88,13 @@ class Outcome(eqx.Module):
 def simulate(scene: Scene) -> Outcome:
     """Run the whole clock of a scene. Pure; see the module's docstring."""
     scene = scene.cast(scene.body.points.dtype)
-    return proceed(scene, start(machine(scene)))
-
-
-def proceed(scene: Scene, state: State) -> Outcome:
-    """Run the clock of a scene from a given state (a stopped run goes on from `Outcome.state` bit for bit)."""
     m = machine(scene)
+    return proceed(m, start(m))
+
+
+def proceed(m: Machine, state: State) -> Outcome:
+    """Run the clock of a machine's scene from a given state."""
+    scene = m.scene
     clock = scene.clock
     length = block_length(clock.frames)
     blocks = -(-clock.frames // length)

@@ -28,7 +28,7 @@ class Machine(NamedTuple):
 
 
 class State(NamedTuple):
-    """What one step hands to the next: u (3, N) m, v (3, N) m/s half a step behind, memories, the force the machine feels."""
+    """What one step hands to the next: u (3, N) m, v (3, N) m/s half a step behind, memories, the force felt."""
 
     u: Float[Array, "3 N"]
     v: Float[Array, "3 N"]
