@@ -44,18 +44,22 @@ class Columns:
         key = str(name)
         if key not in self._numbers:
             cells = self.text(name)
-            values = np.empty(len(cells))
-            for i, cell in enumerate(cells):
-                try:
-                    values[i] = float(cell.replace(",", ".") if self.decimal == "," else cell)
-                except ValueError:
-                    if cell.strip().lower() not in MISSING:
-                        hint = "With decimal commas, set decimal = ','." if "," in cell else ""
-                        place = f"line {self.lines[i]}, column {name!r}"
-                        raise refusal(self.path, place, repr(cell), "a number", hint) from None
-                    values[i] = np.nan
+            try:
+                values = cells.astype(float)
+            except ValueError:
+                values = np.array([self._number(cell, i, name) for i, cell in enumerate(cells)])
             self._numbers[key] = values
         return self._numbers[key]
+
+    def _number(self, cell: str, row: int, name: str | int) -> float:
+        try:
+            return float(cell.replace(",", ".") if self.decimal == "," else cell)
+        except ValueError:
+            if cell.strip().lower() in MISSING:
+                return np.nan
+            hint = "With decimal commas, set decimal = ','." if "," in cell else ""
+            place = f"line {self.lines[row]}, column {name!r}"
+            raise refusal(self.path, place, repr(cell), "a number", hint) from None
 
 
 def load(
@@ -132,4 +136,6 @@ def _guess(line: str, decimal: str) -> str:
 def _split(text: str, mark: str) -> list[str]:
     if mark == " ":
         return re.split(r"\s+", text.strip())
+    if '"' not in text:
+        return [cell.strip() for cell in text.split(mark)]
     return [cell.strip() for cell in next(csv.reader([text], delimiter=mark))]

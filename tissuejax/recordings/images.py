@@ -66,7 +66,7 @@ def silhouette(image: Image, sigma: float = 1.5, platens: tuple[float, float] | 
 
     grey = contrasted(image)
     edges = canny(grey, sigma=sigma)
-    top, bottom = platens or _platens(grey, edges)
+    top, bottom = platens or _platens(grey, edges, sigma)
     middle = 0.5 * (top + bottom)
     row = int(round(middle))
     found = np.flatnonzero(edges[max(row - 1, 0) : row + 2].any(axis=0))
@@ -95,18 +95,22 @@ def metres_per_pixel(first: Silhouette, gap: float) -> float:
     return gap / first.gap
 
 
-def _platens(grey: Float[np.ndarray, "rows columns"], edges: np.ndarray) -> tuple[float, float]:
-    """Faces of the platens: the innermost rows, above and below the middle, where edges run along a third of the
-    picture's width."""
-    thick = edges[:-1] | edges[1:]
+def _platens(grey: Float[np.ndarray, "rows columns"], edges: np.ndarray, sigma: float) -> tuple[float, float]:
+    """Faces of the platens: the innermost rows, above and below the middle, where level edges run along a third of
+    the picture's width."""
+    from scipy.ndimage import gaussian_filter, sobel
+
+    smooth = gaussian_filter(grey, sigma)
+    level = edges & (np.abs(sobel(smooth, 0)) > 2 * np.abs(sobel(smooth, 1)))
+    thick = level[:-1] | level[1:]
     long = np.flatnonzero(thick.sum(axis=1) > edges.shape[1] / 3)
     above, below = long[long < edges.shape[0] / 2], long[long >= edges.shape[0] / 2]
     if not len(above) or not len(below):
         raise InputError("picture: no two level platens found; expected one above and one below, or give their rows")
-    # The columns at both borders show the platens without the specimen.
-    border = max(3, grey.shape[1] // 20)
-    profile = np.concatenate([grey[:, :border], grey[:, -border:]], axis=1).mean(axis=1)
-    return _between(profile, int(above.max())), _between(profile, int(below.min()))
+    # Where the specimen touches a platen there is no edge, so that those columns are left out.
+    faces = [(int(above.max()), thick[above.max()]), (int(below.min()), thick[below.min()])]
+    top, bottom = (_between(grey[:, columns].mean(axis=1), row) for row, columns in faces)
+    return top, bottom
 
 
 def _line(grey: Float[np.ndarray, "rows columns"], row: float) -> Float[np.ndarray, " columns"]:

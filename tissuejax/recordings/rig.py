@@ -90,11 +90,10 @@ def polynomial(
     Raises:
         InputError: fewer distinct x than coefficients.
     """
-    unknowns = degree + (through is None)
-    if len(np.unique(x)) < unknowns + 1:
-        raise InputError(
-            f"polynomial of degree {degree}: {len(np.unique(x))} distinct x; expected at least {unknowns + 1}"
-        )
+    needed = degree + (through is None)
+    distinct = len(np.unique(x if through is None else x[x != through[0]]))
+    if distinct < needed:
+        raise InputError(f"polynomial of degree {degree}: {distinct} distinct x; expected at least {needed}")
     if through is None:
         return np.polynomial.Polynomial.fit(x, y, degree).convert()
     # y = y0 + (x - x0) q(x) with q of one degree less, fitted with weights (x - x0).
