@@ -14,6 +14,7 @@ from jaxtyping import Float
 
 from tissuejax.fitting.levenberg_marquardt import Descent
 from tissuejax.fitting.problem import Problem
+from tissuejax.fitting.transforms import FAR
 
 METHODS = ("adam", "lbfgs")
 RATE = 0.05  # of Adam, in scaled variables, falling to a hundredth by a cosine
@@ -29,7 +30,7 @@ def objective(problem: Problem) -> Callable[[Float[jax.Array, " p"]], Float[jax.
     fixed = {path: jnp.asarray(float(v)) for path, v in problem.start.items()}
 
     def bounded(y):
-        x = box.scale * y
+        x = jnp.where(box.wide, box.small * jnp.sinh(jnp.clip(y, -FAR, FAR)), box.scale * y)
         x = jnp.where(box.only_lower, jnp.where(box.only_lower, box.lower, 0) + box.scale * jax.nn.softplus(y), x)
         x = jnp.where(box.only_upper, jnp.where(box.only_upper, box.upper, 0) - box.scale * jax.nn.softplus(-y), x)
         low = jnp.where(box.both, box.lower, 0)

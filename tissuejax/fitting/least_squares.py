@@ -20,7 +20,7 @@ from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
 from tissuejax.fitting.stability import recorded_stability
-from tissuejax.fitting.starts import scaled_to_data, variations
+from tissuejax.fitting.starts import fitted_moduli, variations
 from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
 
 METHODS = ("levenberg-marquardt", *GRADIENT_METHODS)
@@ -35,6 +35,7 @@ def descend(
     max_steps: int = 200,
     tolerance: float = 1e-9,
     on_accept: Callable[[int, float, dict[str, float]], None] | None = None,
+    to_beat: float = np.inf,
 ) -> Descent:
     """The bare minimisation from one start; `Descent.y` are the free parameters themselves, in the order of
     `problem.free`.
@@ -46,6 +47,7 @@ def descend(
         max_steps: evaluations at most.
         tolerance: relative decrease of the misfit below which it stops.
         on_accept: told evaluations, chi-square and values after every accepted step.
+        to_beat: cost another start reached.
     """
     box = problem.box
     y = box.free(problem.vector(start if start is not None else problem.start))
@@ -62,7 +64,9 @@ def descend(
             r, bend = soften(problem.loss, r)
             return r, jacobian * slope * bend[:, None]
 
-        found = levenberg_marquardt(linearised, y, max_steps=max_steps, tolerance=tolerance, on_accept=heard)
+        found = levenberg_marquardt(
+            linearised, y, max_steps=max_steps, tolerance=tolerance, on_accept=heard, to_beat=to_beat
+        )
     elif method in GRADIENT_METHODS:
         found = gradient_descent(problem, y, method, max_steps=max_steps, tolerance=tolerance, on_accept=heard)
     else:
@@ -86,7 +90,7 @@ def fit(
 
     Args:
         problem: predictor, free parameters, noise, bounds, priors.
-        start: values to begin with, taken as they are; None scales the problem's moduli to the data first.
+        start: values to begin with, taken as they are; None solves for the moduli first.
         multistart: number of starts (the first as given, the others seeded variations); the best end wins.
         method: "levenberg-marquardt", "adam" or "lbfgs".
         holdout: recordings of the sample, outside the problem, to predict and score.
@@ -99,12 +103,12 @@ def fit(
         NotConverged: no start led to a finite misfit.
     """
     begun = time.perf_counter()
-    first = dict(problem.start) | dict(start or {}) if start is not None else scaled_to_data(problem)
+    first = dict(problem.start) | dict(start or {}) if start is not None else fitted_moduli(problem, problem.start)
     tries = [first, *variations(problem, first, multistart - 1, seed)]
     n, ends = 0, []
     options = {"method": method, "max_steps": max_steps, "on_accept": on_accept}
     for values in tries:
-        ends.append(descend(problem, values, **options))
+        ends.append(descend(problem, values, to_beat=min((e.cost for e in ends), default=np.inf), **options))
         n += ends[-1].n_evaluations
     best = min(ends, key=lambda d: (d.cost, not d.converged))
     if not np.isfinite(best.cost):

@@ -18,8 +18,10 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Float
 
+HUGE = 1e140  # residuals beyond are as good as infinite
+CREEP = 40  # evaluations after which a start that lags behind another is watched
 Linearised = Callable[[Float[np.ndarray, " p"]], tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n p"]]]
-CONDITIONING = 30.0  # unit steps in scaled parameters: how much the first damping weighs against the data
+CONDITIONING = 100.0  # unit steps in scaled parameters: how much the first damping weighs against the data
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,7 @@ def levenberg_marquardt(
     max_steps: int = 200,
     tolerance: float = 1e-9,
     on_accept: Callable[[int, float, np.ndarray], None] | None = None,
+    to_beat: float = np.inf,
 ) -> Descent:
     """Minimise half the sum of squares of the residuals from `y`.
 
@@ -95,11 +98,12 @@ def levenberg_marquardt(
         max_steps: evaluations at most.
         tolerance: stop once the Gauss-Newton model promises to lower the cost by less than this share.
         on_accept: called with the number of evaluations, cost and point of every accepted step (progress, checkpoint).
+        to_beat: cost that another start reached; a search that creeps well above it is given up.
     """
     p = len(y)
     step, state = _solver(p)
     r, jacobian = linearised(y)
-    if not (np.isfinite(r).all() and np.isfinite(jacobian).all()):
+    if not (np.abs(r).max(initial=0) < HUGE and np.isfinite(jacobian).all()):
         return Descent(y, np.inf, False, "the model has no finite prediction at the start", 1)
     norms = np.linalg.norm(jacobian, axis=0)
     scale = np.maximum(norms, 1e-8 * (norms.max() or 1.0)) / CONDITIONING
@@ -107,7 +111,7 @@ def levenberg_marquardt(
     z = z_eval = np.asarray(y * scale)
     cost, trace, n, reason, small = np.inf, [], 1, "", 0
     while True:
-        trial = 0.5 * float(r @ r) if np.isfinite(r).all() and np.isfinite(jacobian).all() else np.inf
+        trial = 0.5 * float(r @ r) if np.isfinite(jacobian).all() and np.abs(r).max(initial=0) < HUGE else np.inf
         if np.isfinite(trial):
             rs, js = squeezed(r, jacobian / scale)
         else:  # optimistix compares costs, so a huge one is a rejected step
@@ -129,6 +133,10 @@ def levenberg_marquardt(
             reason = "converged"
         if not reason and np.linalg.norm(z_next - z) <= 1e-14 * (1 + np.linalg.norm(z)):
             reason = "converged"  # steps have shrunk below rounding: nothing nearby is better
+        if not reason and n >= CREEP and n % 10 == 0 and cost > 1.01 * to_beat:
+            before = trace[-CREEP // 2][0] if len(trace) > CREEP // 2 else np.inf
+            if cost > 0.9 * before or len(trace) < CREEP // 3:
+                reason = "given up: another start is better and this one creeps"
         if not reason and n >= max_steps:
             reason = f"no convergence after {n} evaluations"
         if reason:

@@ -88,7 +88,14 @@ class Problem:
     def box(self) -> Box:
         """The transform of the free parameters."""
         lower, upper = zip(*(self.bound(path) for path in self.free), strict=True)
-        return Box(list(lower), list(upper), [self.scale(path) for path in self.free])
+        wide = [path in self.moduli for path in self.free]
+        return Box(list(lower), list(upper), [self.scale(path) for path in self.free], wide)
+
+    @cached_property
+    def moduli(self) -> tuple[str, ...]:
+        """Free constants of the energy in Pa: stress is (nearly) linear in them, and they may range over decades."""
+        declared = self.predictor.model.parameters
+        return tuple(p for p in self.free if p.startswith("energy.") and declared[p].unit == "Pa")
 
     def scale(self, path: str) -> float:
         """Typical magnitude of a parameter, from its start or its declaration."""

@@ -1,39 +1,44 @@
-"""Where fits start: moduli scaled to the data, then a few seeded variations of everything."""
+"""Where fits start: moduli solved for, then a few seeded variations of everything."""
 
 from collections.abc import Iterator, Mapping
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from tissuejax.fitting.problem import Problem
 
+LEAST = 1e-3  # share of the data that a modulus accounts for at least, at the start
 SPREAD = 0.7  # standard deviation of the logarithm (or share of the scale) by which further starts vary
 
 
-def scaled_to_data(problem: Problem) -> dict[str, float]:
-    """The start with all free moduli (unit Pa) multiplied by the one factor that fits the data best.
+def fitted_moduli(problem: Problem, values: Mapping[str, float]) -> dict[str, float]:
+    """`values` with the free moduli at the linear least-squares solution for all other parameters as they are.
 
-    Stress is linear in the moduli of most energies, so one evaluation brings any default to the right order of
-    magnitude.
+    Stress is linear in the moduli of most energies, so one evaluation brings any start near. Signs are kept (each
+    modulus that comes out as zero stays at a thousandth of its share of the data), which keeps terms apart. The start
+    itself is returned if the prediction is not finite or the misfit grows, as it may where stress is not linear.
     """
-    values = {path: float(v) for path, v in problem.start.items()}
-    declared = problem.predictor.model.parameters
-    moduli = [path for path in problem.free if declared[path].unit == "Pa" and path not in problem.priors]
+    values = {path: float(v) for path, v in values.items()}
+    moduli = [path for path in problem.moduli if path not in problem.priors]
     if not moduli:
         return values
-    for _ in range(2):
-        rest = np.concatenate([problem.measured[key][kept] / problem.sigma(key) for key, kept in problem.seen.items()])
-        misfit = problem.residuals(values)[: problem.n_samples]
-        predicted = misfit + rest
-        norm = float(predicted @ predicted)
-        factor = float(predicted @ rest) / norm if norm > 0 and np.isfinite(norm) else 0.0
-        if not np.isfinite(factor) or factor <= 0:
-            return values
-        for path in moduli:
-            lower, upper = problem.bound(path)
-            values[path] = float(np.clip(values[path] * factor, lower, upper))
-        if 0.5 < factor < 2:
-            break
-    return values
+    r, jacobian = problem.linearised(values)
+    columns = jacobian[: problem.n_samples, [problem.free.index(path) for path in moduli]]
+    r = r[: problem.n_samples]
+    size = np.linalg.norm(columns, axis=0)
+    if not (np.isfinite(r).all() and np.isfinite(columns).all() and (size > 0).all()):
+        return values
+    now = np.array([values[path] for path in moduli])
+    target = columns @ now - r
+    ends = [problem.bound(path) for path in moduli]
+    low = np.array([max(a, 0.0) if x > 0 else a for x, (a, _) in zip(now, ends, strict=True)])
+    high = np.array([min(b, 0.0) if x < 0 else b for x, (_, b) in zip(now, ends, strict=True)])
+    solved = lsq_linear(columns / size, target, (low * size, high * size)).x / size
+    least = LEAST * np.linalg.norm(target) / size
+    solved = np.where(np.abs(solved) > least, solved, np.where(now < 0, -least, np.where(now > 0, least, solved)))
+    trial = values | {path: float(np.clip(x, *problem.bound(path))) for path, x in zip(moduli, solved, strict=True)}
+    after = problem.residuals(trial)[: problem.n_samples]
+    return trial if float(after @ after) < float(r @ r) else values
 
 
 def variations(problem: Problem, first: Mapping[str, float], n: int, seed: int) -> Iterator[dict[str, float]]:
@@ -52,4 +57,4 @@ def variations(problem: Problem, first: Mapping[str, float], n: int, seed: int) 
             if np.isfinite(upper - lower) and not lower < value < upper:
                 value = lower + (upper - lower) * float(rng.uniform(0.02, 0.98))
             values[path] = float(np.clip(value, lower, upper))
-        yield values
+        yield fitted_moduli(problem, values)

@@ -3,6 +3,7 @@
 With a scale s (the typical magnitude of the parameter) the free variable y gives
 
     no bound      x = s y
+    no bound, and a magnitude that may range over decades (Ogden's mu)      x = 1e-3 s sinh(y)
     lower only    x = lower + s softplus(y)
     upper only    x = upper - s softplus(-y)
     both          x = lower + (upper - lower) sigmoid(y)
@@ -18,7 +19,9 @@ from jaxtyping import Float
 
 from tissuejax.errors import InputError
 
+FAR = 60.0  # of y, where sinh is still finite
 NUDGE = 1e-3  # a start at a bound is moved inside by this share of the scale (or of the width)
+DECADES = 1e-3  # share of the scale below which a wide-ranging parameter is linear in y, above it logarithmic
 AT_BOUND = 2e-3  # an estimate this near to a bound, as a share of scale or width, is reported as being at it
 
 
@@ -41,11 +44,13 @@ def width(lower: float, upper: float, scale: float) -> float:
 class Box:
     """The transform of a vector of parameters with given bounds and scales."""
 
-    def __init__(self, lower: list[float], upper: list[float], scale: list[float]):
+    def __init__(self, lower: list[float], upper: list[float], scale: list[float], wide: list[bool] | None = None):
         self.lower, self.upper = np.asarray(lower, float), np.asarray(upper, float)
         self.scale = np.asarray(scale, float)
         low, high = np.isfinite(self.lower), np.isfinite(self.upper)
         self.both, self.only_lower, self.only_upper = low & high, low & ~high, high & ~low
+        self.wide = ~low & ~high & np.asarray(wide if wide is not None else [False] * len(self.scale))
+        self.small = DECADES * self.scale
         self.span = np.where(self.both, self.upper - self.lower, self.scale)
         self.span = np.where(np.isfinite(self.span), self.span, self.scale)
 
@@ -59,6 +64,7 @@ class Box:
         x = self.inward(np.asarray(x, float))
         y = x / self.scale
         with np.errstate(all="ignore"):
+            y = np.where(self.wide, np.arcsinh(x / self.small), y)
             y = np.where(self.only_lower, _inverse_softplus((x - self.lower) / self.scale), y)
             y = np.where(self.only_upper, -_inverse_softplus((self.upper - x) / self.scale), y)
             share = (x - self.lower) / self.span
@@ -69,6 +75,9 @@ class Box:
         x, slope = self.scale * y, self.scale.copy()
         grow, fall = _sigmoid(y), _sigmoid(-y)
         with np.errstate(all="ignore"):
+            far = np.clip(y, -FAR, FAR)
+            x = np.where(self.wide, self.small * np.sinh(far), x)
+            slope = np.where(self.wide, self.small * np.cosh(far), slope)
             x = np.where(self.only_lower, self.lower + self.scale * np.logaddexp(0, y), x)
             x = np.where(self.only_upper, self.upper - self.scale * np.logaddexp(0, -y), x)
             x = np.where(self.both, self.lower + self.span * grow, x)
