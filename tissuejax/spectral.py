@@ -14,6 +14,7 @@ Eigenvalues come from a fixed number of branch-free cyclic Jacobi rotations on c
 2013, 8.5): no difference between one point and a million, float32 and float64 alike.
 """
 
+import itertools
 from functools import partial
 
 import jax
@@ -26,6 +27,7 @@ from tissuejax.tensors import Sym, double_dot
 
 SWEEPS = 4  # quadratic convergence: 4 reach float64 round-off (tests, also at widely spread eigenvalues)
 CLOSE = 0.1  # below this spread of ln(eigenvalue) second divided differences are integrated
+UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # order of the components of Sym
 Vector = tuple[Array, Array, Array]
 
 
@@ -34,23 +36,31 @@ def eigensystem(C: Sym) -> tuple[Vector, tuple[Vector, Vector, Vector]]:
     return _eigensystem(Sym(*jnp.broadcast_arrays(*C)))
 
 
-def power_sums(C: Sym, alphas: tuple[Float[Array, ""], ...]) -> tuple[Float[Array, "..."], ...]:
+def power_sums(C: Sym, alphas: tuple[Float[Array, "..."], ...]) -> tuple[Float[Array, "..."], ...]:
     """sum_i l_i^alpha for each alpha, l_i^2 the eigenvalues of C (l_i: principal stretches); it is tr C^(alpha/2)."""
-    C = _prepared(C)
-    return _traces(0, C, tuple(0.5 * jnp.asarray(a) for a in alphas))
+    C, s = _prepared(C, alphas)
+    return tuple(_traces(0, C, 0.5 * s))
 
 
-def powers(C: Sym, exponents: tuple[Float[Array, ""], ...]) -> tuple[Sym, ...]:
+def powers(C: Sym, exponents: tuple[Float[Array, "..."], ...]) -> tuple[Sym, ...]:
     """C^s for each exponent s (any real, traced or not) of a positive definite symmetric tensor."""
-    return _powers(0, _prepared(C), tuple(1.0 * jnp.asarray(s) for s in exponents))
+    C, s = _prepared(C, exponents)
+    together = _powers(0, C, s)
+    return tuple(Sym(*(c[k] for c in together)) for k in range(len(exponents)))
 
 
-def _prepared(C: Sym) -> Sym:
-    kind = jnp.result_type(*C, float)
-    return Sym(*jnp.broadcast_arrays(*(jnp.asarray(c, dtype=kind) for c in C)))
+def _prepared(C: Sym, exponents: tuple[Array, ...]) -> tuple[Sym, Array]:
+    """One dtype and shape for the components, and the exponents along a new first axis (less for the compiler)."""
+    kind = jnp.result_type(*C, *exponents, float)
+    C = Sym(*jnp.broadcast_arrays(*(jnp.asarray(c, dtype=kind) for c in C)))
+    exponents = [jnp.asarray(s, dtype=kind) for s in exponents]
+    one_each = all(s.ndim == 0 for s in exponents)
+    shape = (1,) * C.xx.ndim if one_each else C.xx.shape
+    return C, jnp.stack([jnp.broadcast_to(s, shape) for s in exponents])
 
 
 # --- f(x) = x^s ln(x)^m as trace and as tensor, each with its derivative ----------------------------------------------
+# C has components of shape `...`, s has shape `k ...` (or `k 1...`): results have the axis of exponents first.
 
 
 def _f(m: int, s: Array, x: Array) -> Array:
@@ -59,53 +69,51 @@ def _f(m: int, s: Array, x: Array) -> Array:
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _traces(m: int, C: Sym, s: tuple[Array, ...]) -> tuple[Array, ...]:
+def _traces(m: int, C: Sym, s: Float[Array, "k ..."]) -> Float[Array, "k ..."]:
     """tr C^s ln(C)^m."""
     values, _ = _eigensystem(C)
-    return tuple(sum(_f(m, si, x) for x in values) for si in s)
+    return sum(_f(m, s, x) for x in values)
 
 
 @partial(_traces.defjvp, symbolic_zeros=True)
 def _traces_jvp(m, primals, tangents):
     (C, s), (dC, ds) = primals, tangents
     dC, along_C = _tangent(dC)
-    out = [jnp.zeros_like(C.xx) for _ in s]
+    value = _traces(m, C, s)
+    out = jnp.zeros_like(value)
     if along_C:  # f'(C) : dC, f' = s x^(s-1) ln^m + m x^(s-1) ln^(m-1)
-        less = tuple(si - 1 for si in s)
-        out = [si * double_dot(f, dC) for si, f in zip(s, _powers(m, C, less))]
+        out = s * double_dot(_powers(m, C, s - 1), dC)
         if m:
-            out = [o + m * double_dot(f, dC) for o, f in zip(out, _powers(m - 1, C, less))]
-    if along := [i for i, d in enumerate(ds) if not isinstance(d, SymbolicZero)]:
-        for i, f in zip(along, _traces(m + 1, C, tuple(s[i] for i in along))):
-            out[i] = out[i] + f * ds[i]
-    return _traces(m, C, s), tuple(out)
+            out = out + m * double_dot(_powers(m - 1, C, s - 1), dC)
+    if not isinstance(ds, SymbolicZero):
+        out = out + _traces(m + 1, C, s) * ds
+    return value, out
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _powers(m: int, C: Sym, s: tuple[Array, ...]) -> tuple[Sym, ...]:
+def _powers(m: int, C: Sym, s: Float[Array, "k ..."]) -> Sym:
     """C^s ln(C)^m."""
     values, vectors = _eigensystem(C)
-    return tuple(_assemble(vectors, {(i, i): _f(m, si, x) for i, x in enumerate(values)}) for si in s)
+    return _assemble(vectors, {(i, i): _f(m, s, x) for i, x in enumerate(values)})
 
 
 @partial(_powers.defjvp, symbolic_zeros=True)
 def _powers_jvp(m, primals, tangents):
     (C, s), (dC, ds) = primals, tangents
     dC, along_C = _tangent(dC)
-    out = list(_derivative(m, C, s, dC)) if along_C else [Sym(*map(jnp.zeros_like, C)) for _ in s]
-    if along := [i for i, d in enumerate(ds) if not isinstance(d, SymbolicZero)]:
-        for i, f in zip(along, _powers(m + 1, C, tuple(s[i] for i in along))):
-            out[i] = _added(out[i], f, ds[i])
-    return _powers(m, C, s), tuple(out)
+    value = _powers(m, C, s)
+    out = _derivative(m, C, s, dC) if along_C else Sym(*map(jnp.zeros_like, value))
+    if not isinstance(ds, SymbolicZero):
+        out = _added(out, _powers(m + 1, C, s), ds)
+    return value, out
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _derivative(m: int, C: Sym, s: tuple[Array, ...], H: Sym) -> tuple[Sym, ...]:
+def _derivative(m: int, C: Sym, s: Float[Array, "k ..."], H: Sym) -> Sym:
     """Derivative of C^s ln(C)^m in the direction H (Daleckii and Krein)."""
     values, vectors = _eigensystem(C)
     h = _in_eigenframe(vectors, H)
-    pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
-    return tuple(_assemble(vectors, {ij: _first(m, si, *(values[i] for i in ij)) * h[ij] for ij in pairs}) for si in s)
+    return _assemble(vectors, {(i, j): _first(m, s, values[i], values[j]) * h[i, j] for i, j in UPPER})
 
 
 @partial(_derivative.defjvp, symbolic_zeros=True)
@@ -113,35 +121,26 @@ def _derivative_jvp(m, primals, tangents):
     (C, s, H), (dC, ds, dH) = primals, tangents
     dC, along_C = _tangent(dC)
     dH, along_H = _tangent(dH)
-    out = [Sym(*map(jnp.zeros_like, C)) for _ in s]
-    if along_H:
-        out = list(_derivative(m, C, s, dH))
+    value = _derivative(m, C, s, H)
+    out = _derivative(m, C, s, dH) if along_H else Sym(*map(jnp.zeros_like, value))
     if along_C:
-        out = [_added(o, f) for o, f in zip(out, _second_derivative(m, C, s, H, dC))]
-    if along := [i for i, d in enumerate(ds) if not isinstance(d, SymbolicZero)]:
-        for i, f in zip(along, _derivative(m + 1, C, tuple(s[i] for i in along), H)):
-            out[i] = _added(out[i], f, ds[i])
-    return _derivative(m, C, s, H), tuple(out)
+        out = _added(out, _second_derivative(m, C, s, H, dC))
+    if not isinstance(ds, SymbolicZero):
+        out = _added(out, _derivative(m + 1, C, s, H), ds)
+    return value, out
 
 
-def _second_derivative(m: int, C: Sym, s: tuple[Array, ...], H: Sym, K: Sym) -> tuple[Sym, ...]:
+def _second_derivative(m: int, C: Sym, s: Float[Array, "k ..."], H: Sym, K: Sym) -> Sym:
     """Second derivative of C^s ln(C)^m in the directions H and K."""
     values, vectors = _eigensystem(C)
     h, k = _in_eigenframe(vectors, H), _in_eigenframe(vectors, K)
-    out = []
-    for si in s:
-        cache = {}
-        frame = {}
-        for i, j in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]:
-            total = 0.0
-            for n in range(3):
-                triple = tuple(sorted((i, n, j)))
-                if triple not in cache:
-                    cache[triple] = _second(m, si, *(values[q] for q in triple))
-                total = total + cache[triple] * (h[i, n] * k[n, j] + k[i, n] * h[n, j])
-            frame[i, j] = total
-        out.append(_assemble(vectors, frame))
-    return tuple(out)
+    triples = itertools.combinations_with_replacement(range(3), 3)
+    f = {triple: _second(m, s, *(values[q] for q in triple)) for triple in triples}
+    frame = {
+        (i, j): sum(f[tuple(sorted((i, n, j)))] * (h[i, n] * k[n, j] + k[i, n] * h[n, j]) for n in range(3))
+        for i, j in UPPER
+    }
+    return _assemble(vectors, frame)
 
 
 # --- divided differences ----------------------------------------------------------------------------------------------
@@ -197,23 +196,27 @@ def _curvature(m: int, s: Array, x: Array) -> Array:
 
 
 @jax.custom_jvp
+@jax.jit
 def _eigensystem(C: Sym) -> tuple[Vector, tuple[Vector, Vector, Vector]]:
-    a = {(0, 0): C.xx, (1, 1): C.yy, (2, 2): C.zz, (0, 1): C.xy, (0, 2): C.xz, (1, 2): C.yz}
     one, zero = jnp.ones_like(C.xx), jnp.zeros_like(C.xx)
-    v = [(one, zero, zero), (zero, one, zero), (zero, zero, one)]
-    for _ in range(SWEEPS):
-        for p, q, r in ((0, 1, 2), (0, 2, 1), (1, 2, 0)):
-            d, off = a[q, q] - a[p, p], 2 * a[p, q]
-            reach = jnp.abs(d) + jnp.sqrt(d * d + off * off)
-            t = jnp.where(d >= 0, off, -off) / jnp.where(reach > 0, reach, 1.0)
-            c = 1 / jnp.sqrt(t * t + 1)
-            s = t * c
-            rp, rq = tuple(sorted((r, p))), tuple(sorted((r, q)))
-            a[p, p], a[q, q], a[p, q] = a[p, p] - t * a[p, q], a[q, q] + t * a[p, q], zero
-            a[rp], a[rq] = c * a[rp] - s * a[rq], s * a[rp] + c * a[rq]
-            pairs = list(zip(v[p], v[q]))
-            v[p], v[q] = tuple(c * x - s * y for x, y in pairs), tuple(s * x + c * y for x, y in pairs)
-    return (a[0, 0], a[1, 1], a[2, 2]), tuple(v)
+    start = C, ((one, zero, zero), (zero, one, zero), (zero, zero, one))
+    # A loop, not unrolled: the compiler's time grows faster than the number of operations it sees at once.
+    A, v = jax.lax.fori_loop(0, 3 * SWEEPS, lambda _, state: _rotation(*state), start)
+    return (A.xx, A.yy, A.zz), v
+
+
+def _rotation(A: Sym, v: tuple[Vector, ...]) -> tuple[Sym, tuple[Vector, ...]]:
+    """Annihilate the xy entry by a rotation, then rename the axes x y z to z x y, so that three calls make a sweep."""
+    d, off = A.yy - A.xx, 2 * A.xy
+    reach = jnp.abs(d) + jnp.sqrt(d * d + off * off)
+    t = jnp.where(d >= 0, off, -off) / jnp.where(reach > 0, reach, 1.0)
+    c = 1 / jnp.sqrt(t * t + 1)
+    s = t * c
+    xx, yy = A.xx - t * A.xy, A.yy + t * A.xy
+    xz, yz = c * A.xz - s * A.yz, s * A.xz + c * A.yz
+    x = tuple(c * a - s * b for a, b in zip(v[0], v[1]))
+    y = tuple(s * a + c * b for a, b in zip(v[0], v[1]))
+    return Sym(xx=yy, yy=A.zz, zz=xx, xy=yz, xz=jnp.zeros_like(t), yz=xz), (y, v[2], x)
 
 
 @_eigensystem.defjvp
@@ -239,7 +242,7 @@ def _assemble(v: tuple[Vector, ...], frame: dict[tuple[int, int], Array]) -> Sym
             x * (v[i][k] * v[i][l] if i == j else v[i][k] * v[j][l] + v[j][k] * v[i][l]) for (i, j), x in frame.items()
         )
 
-    return Sym(entry(0, 0), entry(1, 1), entry(2, 2), entry(0, 1), entry(0, 2), entry(1, 2))
+    return Sym(*(entry(k, l) for k, l in UPPER))
 
 
 def _in_eigenframe(v: tuple[Vector, ...], H: Sym) -> dict[tuple[int, int], Array]:

@@ -2,8 +2,8 @@
 
 For an incompressible solid the work in logarithmic principal strains is W(e1, e2) with e3 = -e1 - e2. Its Hessian D
 relates increments of Kirchhoff stress differences to increments of strain, and Drucker's d tau : d e > 0 says that D is
-positive definite (the test of ABAQUS too). One number tells: the least eigenvalue of D, 0 at the first unstable stretch,
-which enters a fit as a constraint or a penalty.
+positive definite (the test of ABAQUS too). The least eigenvalue of D is 0 at the first unstable stretch
+and enters a fit as a constraint or a penalty.
 """
 
 from collections.abc import Mapping
