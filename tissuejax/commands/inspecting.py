@@ -9,6 +9,7 @@ import numpy as np
 from tissuejax.commands.command import Command, Reply
 from tissuejax.recordings.files import names, read
 from tissuejax.recordings.recording import Recording, Sample
+from tissuejax.recordings.remarks import remarks
 from tissuejax.report.page import write_figures
 from tissuejax.report.scales import display
 
@@ -73,6 +74,7 @@ def described(sample: Sample) -> dict:
             "size": np.ptp(geometry.points, axis=0).tolist(),
         },
         "recordings": {name: _recording(r) for name, r in sample.recordings.items()},
+        "remarks": remarks(sample),
     }
 
 
@@ -128,4 +130,4 @@ def text_of(record: dict) -> list[str]:
             lines.append(
                 f"    measured  {key:<18} {span}, {c['n']} samples{rate} over {c['duration']:.4g} s, {noise}{lost}"
             )
-    return lines
+    return lines + [f"  note: {remark}" for remark in record["remarks"]]

@@ -11,7 +11,7 @@ def display(unit: str, size: float) -> tuple[float, str]:
     if unit not in SCALED or not math.isfinite(size) or size <= 0:
         return 1.0, unit
     for factor, prefix in PREFIXES:
-        if (unit != "s" or factor <= 1) and size >= 0.5 * factor:
+        if (unit != "s" or factor <= 1) and size >= factor:
             return factor, prefix + unit
     return 1e-6, "u" + unit
 
