@@ -1,4 +1,6 @@
-"""Samples of every experiment kind made from the layout tables, for the tests of readers and writers."""
+"""Samples of every kind made from the layout tables, and small lab tables, for the tests of readers and writers."""
+
+from pathlib import Path
 
 import numpy as np
 
@@ -70,3 +72,19 @@ def same(a: Sample, b: Sample) -> None:
 
 
 KINDS = sorted(LAYOUTS)
+UNI = """
+file = "t.csv"
+experiment = "uniaxial"
+[columns]
+time = { column = "t", unit = "ms" }
+stretch = { column = "l" }
+nominal_stress = { column = "P", unit = "kPa" }
+"""
+ROWS = "t,l,P\n0,1,0\n500,1.1,2\n1000,1.2,5\n"
+
+
+def put(folder: Path, table: str = ROWS, side: str = UNI, name: str = "t.csv") -> Path:
+    """A table and its side file; the path of the side file."""
+    (folder / name).write_text(table)
+    (folder / "s.toml").write_text(side)
+    return folder / "s.toml"

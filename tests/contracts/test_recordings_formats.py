@@ -5,9 +5,9 @@ import pytest
 
 from tests.contracts.recordings_made import recording, sample
 from tissuejax.errors import InputError
-from tissuejax.recordings import checks, files, inspect
-from tissuejax.recordings.recording import Sample
-from tissuejax.storage import plain
+from tissuejax.fitting.setup import split
+from tissuejax.recordings import checks, files, remarks
+from tissuejax.recordings.recording import Recording, Sample
 
 FORMATS = files.formats()
 JUNK = {
@@ -58,46 +58,23 @@ def test_absent_file_and_folder(tmp_path):
         files.read(tmp_path)
 
 
-def test_identical_recordings_are_refused_wherever_they_lie(tmp_path):
-    files.write(sample("uniaxial"), tmp_path / "a.h5")
-    with pytest.raises(InputError, match=r"a.h5: r1.*a.h5: r1.*identical data"):
-        files.read_each([tmp_path / "a.h5", tmp_path / "a.h5"])
+def test_identical_recordings_are_refused():
     one = recording("planar", np.random.default_rng(1))
     with pytest.raises(InputError, match="'x' and 'y'.*identical"):
         checks.distinct({"x": one, "y": one})
-    other = files.write(sample("uniaxial", seed=5), tmp_path / "b.h5")
-    with pytest.raises(InputError, match="sample named 's1'"):
-        files.read_each([tmp_path / "a.h5", other])
     checks.distinct({"x": one, "y": recording("planar", np.random.default_rng(2))})
+    made = Sample("s", {"x": one, "y": one})
+    with pytest.raises(InputError, match="identical data"):
+        split(made)
+    assert split(made, only=("y",)) == (("y",), ())
 
 
-def test_too_few_values_for_the_parameters():
-    made = sample("uniaxial")
-    assert checks.enough(made, 6) == 7
-    with pytest.raises(InputError, match="7 measured values for 7 free parameters; expected at least 8"):
-        checks.enough(made, 7)
-
-
-@pytest.mark.parametrize("kind", ["uniaxial", "biaxial", "probing", "cutting"])
-def test_descriptions_tell_what_is_there(kind, tmp_path):
-    files.write(sample(kind), tmp_path / "a.h5")
-    (told,) = inspect.describe(tmp_path / "a.h5")["samples"]
-    assert plain(told) == told
-    (r,) = told["recordings"]
-    assert r["experiment"] == kind
-    text = "\n".join(inspect.lines(told))
-    assert kind in text
-    assert "s1" in text
-    if kind in ("probing", "cutting"):
-        assert "1 hexahedron cells" in text
-        assert "of markers is missing" in text
-
-
-def test_descriptions_measure_ranges():
-    r = recording("uniaxial", np.random.default_rng(0))
-    told = inspect.describe_recording(r)
-    assert told["inputs"]["stretch"]["min"] == r.inputs["stretch"].min()
-    assert told["channels"]["nominal_stress"]["max"] == r.channels["nominal_stress"].values.max()
-    assert told["duration"] == pytest.approx(np.ptp(r.inputs["time"]))
-    twice = Sample("s", {"a": r, "b": r})
-    assert "identical" in " ".join(inspect.remarks(twice))
+def test_remarks_tell_what_is_unusual_and_are_silent_otherwise():
+    rng = np.random.default_rng(0)
+    pull, lost = recording("uniaxial", rng), recording("probing", rng)
+    told = " ".join(remarks.remarks(Sample("s", {"a": pull, "b": pull, "c": lost})))
+    for words in ("identical", "a: starts at stretch", "c: 8.3% of markers is missing"):
+        assert words in told, told
+    inputs = dict(pull.inputs) | {"stretch": np.linspace(1, 2, 7)}
+    plain = Recording("a", "uniaxial", inputs, pull.channels)
+    assert remarks.remarks(Sample("s", {"a": plain})) == []

@@ -7,26 +7,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tests.contracts.recordings_made import ROWS, UNI, put
 from tissuejax.errors import InputError
 from tissuejax.recordings import files
 from tissuejax.recordings.table import read_table
 
 QUICK = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-UNI = """
-file = "t.csv"
-experiment = "uniaxial"
-[columns]
-time = { column = "t", unit = "ms" }
-stretch = { column = "l" }
-nominal_stress = { column = "P", unit = "kPa" }
-"""
-ROWS = "t,l,P\n0,1,0\n500,1.1,2\n1000,1.2,5\n"
-
-
-def put(folder, table: str = ROWS, side: str = UNI, name: str = "t.csv"):
-    (folder / name).write_text(table)
-    (folder / "s.toml").write_text(side)
-    return folder / "s.toml"
 
 
 def only(side, name=None):
@@ -284,66 +270,6 @@ def test_changed_files_are_read_anew(tmp_path):
     assert only(path).inputs["stretch"][1] == 1.15
 
 
-BREACHES = {
-    "no toml": (ROWS, "file = ", ["s.toml", "not TOML"]),
-    "key": (ROWS, "colums = 1\n" + UNI, ["'colums'", "'columns'"]),
-    "key in part": (ROWS, UNI + "[[part]]\nwere = {}\n", ["'were'", "'where'"]),
-    "no file": (ROWS, UNI.replace('file = "t.csv"', ""), ["file", "found nothing"]),
-    "file absent": (ROWS, UNI.replace("t.csv", "u.csv"), ["u.csv", "no such file"]),
-    "experiment": (ROWS, UNI.replace("uniaxial", "uniaxail"), ["'uniaxail'", "'uniaxial'"]),
-    "quantity": (ROWS, UNI.replace("stretch =", "strech ="), ["'strech'", "'stretch'"]),
-    "column": (ROWS, UNI.replace('"P"', '"Pa"'), ["t.csv", "'Pa'", "'P'"]),
-    "wrong unit": (ROWS, UNI.replace("kPa", "mm"), ["columns.nominal_stress", "'mm'", "'Pa'"]),
-    "unknown unit": (ROWS, UNI.replace("kPa", "kPA"), ["'kPA'", "'kPa'"]),
-    "no unit": (ROWS, UNI.replace(', unit = "kPa"', ""), ["columns.nominal_stress", "no unit"]),
-    "no load": (ROWS, UNI.replace("nominal_stress", "#"), ["nothing for the load", "force"]),
-    "two motions": (ROWS, UNI + 'strain = { column = "l" }', ["stretch and strain"]),
-    "positive": (ROWS, 'positive = "push"\n' + UNI, ["'push'", "'tension' or 'compression'"]),
-    "sign": (ROWS, UNI.replace('"kPa"', '"kPa", sign = 2'), ["sign", "1 or -1"]),
-    "no height": (
-        ROWS,
-        UNI.replace('stretch = { column = "l"', 'displacement = { column = "l", unit = "m"'),
-        ["height"],
-    ),
-    "no area": (ROWS, UNI.replace("nominal_stress", "force").replace("kPa", "N"), ["specimen", "area, diameter"]),
-    "size zero": (ROWS, UNI + '[specimen]\nheight = "0 mm"', ["specimen.height", "above zero"]),
-    "size without unit": (ROWS, UNI + "[specimen]\nheight = 3", ["specimen.height", "no unit"]),
-    "size unknown": (ROWS, UNI + '[specimen]\nhight = "3 mm"', ["'hight'", "'height'"]),
-    "noise negative": (ROWS, UNI + '[noise]\nnominal_stress = "-3 Pa"', ["noise.nominal_stress", "not negative"]),
-    "noise of what is not there": (ROWS, UNI + '[noise]\nforce = "3 N"', ["noise.force", "noise.nominal_stress"]),
-    "attributes": (ROWS, UNI + '[attributes]\nage = "old"', ["attributes.age", "a number"]),
-    "shear in tension": (ROWS, UNI.replace("stretch =", "shear ="), ["uniaxial", "shear"]),
-    "one column biaxial": (ROWS, UNI.replace("uniaxial", "biaxial"), ["1 column", "two for a biaxial"]),
-    "empty table": ("", UNI, ["t.csv", "empty file"]),
-    "header only": ("t,l,P\n", UNI, ["t.csv", "rows", "none"]),
-    "comments only": ("# a\n\n", UNI, ["t.csv", "empty table"]),
-    "one row": ("t,l,P\n0,1,0\n", UNI, ["1 sample", "at least 2"]),
-    "short row": (ROWS + "1500,1.3\n", UNI, ["line 5", "2 cells", "expected 3"]),
-    "word": (ROWS.replace("1.1", "abc"), UNI, ["line 3", "'l'", "'abc'"]),
-    "missing cell": (ROWS.replace("1.1", ""), UNI, ["line 3", "'l'", "nan", "missing"]),
-    "infinite": (ROWS.replace("1.1", "inf"), UNI, ["line 3", "inf"]),
-    "time back": (ROWS.replace("1000", "400"), UNI, ["'t'", "index 2", "strictly increasing"]),
-    "stretch zero": (ROWS.replace("1.1", "0"), UNI, ["stretch 0", "above zero"]),
-    "names twice": (ROWS.replace("t,l,P", "t,l,l"), UNI, ["line 1", "'l'"]),
-    "where nothing": (ROWS, UNI.replace("[columns]", "where = { l = 7 }\n[columns]"), ["keeps no row"]),
-    "same name twice": (ROWS, UNI + "[[part]]\n[[part]]\n", ["'r1'", "two parts"]),
-    "the same twice": (ROWS, UNI + '[[part]]\n[[part]]\nrecording = "r2"', ["r1", "r2", "identical data"]),
-    "binary table": ("t,l,P\n\0\0\0", UNI, ["binary"]),
-    "lowpass": (ROWS, UNI.replace("[columns]", 'lowpass = "5 Hz"\n[columns]'), ["cutoff 5 Hz", "2 samples a second"]),
-    "cutting": (ROWS, UNI.replace("uniaxial", "cutting"), ["cutting", "recording files only"]),
-}
-
-
-@pytest.mark.parametrize("breach", BREACHES)
-def test_each_breach_is_refused_with_its_place(breach, tmp_path):
-    rows, text, words = BREACHES[breach]
-    with pytest.raises(InputError) as refused:
-        files.read(put(tmp_path, rows, text))
-    for word in words:
-        assert word in str(refused.value), str(refused.value)
-    assert refused.value.exit_code == 2
-
-
 def test_missing_rows_are_dropped_on_request(tmp_path):
     r = only(put(tmp_path, ROWS.replace("1.1", "NaN"), 'missing = "drop"\n' + UNI))
     np.testing.assert_allclose(r.inputs["stretch"], [1, 1.2])
@@ -368,21 +294,11 @@ def test_what_a_machine_wrote_comes_back(data, diameter, height, positive, tmp_p
     )
     specimen = f'height = "{height!r} mm"\ndiameter = "{diameter!r} mm"'
     path = put(tmp_path, rows, side(columns, more=f'positive = "{positive}"', specimen=specimen))
-    files.convert(path, tmp_path / "out.h5")
+    files.write(files.read(path), tmp_path / "out.h5")
     r = only(tmp_path / "out.h5")
     np.testing.assert_array_equal(r.inputs["time"], time)
     np.testing.assert_allclose(r.inputs["stretch"], stretch, rtol=1e-11, atol=1e-12)
     np.testing.assert_allclose(r.channels["nominal_stress"].values, stress, rtol=1e-11, atol=1e-9)
-
-
-def test_convert_writes_a_file_for_each_sample(tmp_path):
-    text = UNI.replace('"uniaxial"', '"uniaxial"\nsample = "{id}"')
-    path = put(tmp_path, "id,t,l,P\na,0,1,0\na,1,1.1,1\nb,0,1,0\nb,1,1.2,1\n", text)
-    with pytest.raises(InputError, match=r"\{sample\}"):
-        files.convert(path, tmp_path / "out.h5")
-    assert [p.name for p in files.convert(path, tmp_path / "x-{sample}.h5")] == ["x-a.h5", "x-b.h5"]
-    assert files.read(tmp_path / "x-b.h5").recordings["r1"].inputs["stretch"][1] == 1.2
-    assert [p.name for p in files.convert(f"{path}#b", tmp_path / "b.h5")] == ["b.h5"]
 
 
 def test_shared_files_are_found_or_said_how_to_find(tmp_path, monkeypatch):

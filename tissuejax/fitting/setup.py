@@ -9,6 +9,7 @@ from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.transforms import checked_bounds
 from tissuejax.fitting.weights import noise
 from tissuejax.parameters import checked
+from tissuejax.recordings.checks import distinct
 from tissuejax.recordings.recording import Sample
 
 STIFFNESS = 300.0  # an instability of 1 % of the mean stiffness costs as much as a misfit of 3 noise levels everywhere
@@ -25,7 +26,8 @@ def split(
         holdout: predict these only.
 
     Raises:
-        InputError: an unknown name, one listed twice or in both lists, or nothing left to fit.
+        InputError: an unknown name, one listed twice or in both lists, two recordings with identical data, or nothing
+            left to fit.
     """
     for kind, names in (("recording", only), ("recording to hold out", holdout)):
         for name in names:
@@ -39,7 +41,9 @@ def split(
     fitted = tuple(n for n in sample.recordings if (n in only if only else n not in holdout))
     if not fitted:
         raise InputError(f"nothing is left to fit: all of {', '.join(sample.recordings)} are held out")
-    return fitted, tuple(n for n in sample.recordings if n in holdout)
+    held = tuple(n for n in sample.recordings if n in holdout)
+    distinct({n: sample.recordings[n] for n in (*fitted, *held)})
+    return fitted, held
 
 
 def problem(

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.errors import InputError
-from tissuejax.recordings.recording import Recording, Sample
+from tissuejax.recordings.recording import Recording
 
 
 def refusal(file: object, item: str, found: str, expected: str, advice: str = "") -> InputError:
@@ -81,19 +81,3 @@ def distinct(recordings: Mapping[str, Recording] | Iterable[tuple[str, Recording
                 "(repeats of a test differ by noise)"
             )
         seen[key] = label
-
-
-def enough(sample: Sample, n_parameters: int, names: Iterable[str] | None = None) -> int:
-    """The number of measured values in the named recordings (all where None), refused if no more than parameters.
-
-    Raises:
-        InputError: fewer values than parameters + 1.
-    """
-    chosen = [sample.recordings[n] for n in (sample.recordings if names is None else names)]
-    count = sum(int(np.isfinite(np.asarray(c.values)).sum()) for r in chosen for c in r.channels.values())
-    if count <= n_parameters:
-        raise InputError(
-            f"sample {sample.name!r}: {count} measured values for {n_parameters} free parameters; expected at least "
-            f"{n_parameters + 1}: record more, free fewer parameters, or choose a smaller energy"
-        )
-    return count

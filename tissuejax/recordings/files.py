@@ -8,18 +8,17 @@ The format is chosen by the content of a file, then by its ending; a new format 
 """
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import tissuejax.recordings as folder
 from tissuejax.errors import InputError, unknown
 from tissuejax.families import members
-from tissuejax.recordings import checks
 from tissuejax.recordings.format import Format
 from tissuejax.recordings.hdf5_writing import write
 from tissuejax.recordings.recording import Sample
 
-__all__ = ["convert", "formats", "names", "read", "read_all", "read_each", "write"]
+__all__ = ["formats", "names", "read", "read_all", "write"]
 
 
 def formats() -> dict[str, Format]:
@@ -65,46 +64,6 @@ def read_all(path: str | os.PathLike) -> dict[str, Sample]:
     path, chosen = _split(path)
     kind = _format(path)
     return {name: kind.read(path, name) for name in ([chosen] if chosen else kind.names(path))}
-
-
-def read_each(paths: Iterable[str | os.PathLike]) -> dict[str, Sample]:
-    """One sample from each of several files by sample name, refusing a recording that comes twice.
-
-    Raises:
-        InputError: as `read`; two samples with one name; identical recordings.
-    """
-    found: dict[str, Sample] = {}
-    labels = []
-    for path in paths:
-        sample = read(path)
-        labels += [(f"{path}: {name}", recording) for name, recording in sample.recordings.items()]
-        checks.distinct(labels)
-        if sample.name in found:
-            raise InputError(f"{path}: a sample named {sample.name!r} came already: give each sample its own name")
-        found[sample.name] = sample
-    return found
-
-
-def convert(path: str | os.PathLike, out: str | os.PathLike) -> list[Path]:
-    """Write what any readable file holds as recording files (HDF5), one a sample; returns the files written.
-
-    Args:
-        path: a side file, a recording file, or "file#NAME" for one sample.
-        out: the file to write; with several samples its name holds "{sample}".
-
-    Raises:
-        InputError: as `read` and `write`; several samples and no "{sample}" in `out`.
-    """
-    known = names(path)
-    template = os.fspath(out)
-    if len(known) > 1 and "{sample}" not in template:
-        source = os.fspath(path)
-        raise InputError(
-            f"{path}: found {len(known)} samples, expected one for {template!r}: name one, as in {source}#{known[0]}, "
-            "or put {sample} into the output name for a file each"
-        )
-    whole = _split(path)[0]
-    return [write(read(whole, name), template.replace("{sample}", name)) for name in known]
 
 
 def _split(path: str | os.PathLike) -> tuple[Path, str | None]:
