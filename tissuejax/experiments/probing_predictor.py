@@ -7,7 +7,6 @@ finite is refused with the time and the element, never masked.
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from typing import ClassVar
 
 import equinox as eqx
@@ -18,6 +17,7 @@ from jaxtyping import Array, Float
 
 from tissuejax.cache import keep_programs
 from tissuejax.errors import UnstableSimulation, unknown
+from tissuejax.experiments import programs
 from tissuejax.experiments.homogeneous import local
 from tissuejax.experiments.predictor import Predictor, Tangents
 from tissuejax.experiments.probing import Simulated, simulated
@@ -26,7 +26,6 @@ from tissuejax.experiments.probing_setup import Setup, setups
 from tissuejax.model import Model
 from tissuejax.parameters import Values
 from tissuejax.recordings.recording import Channel, Recording, Sample
-from tissuejax.tled.simulate import COMPILER_OPTIONS
 
 
 class ProbingPredictor(Predictor):
@@ -79,7 +78,7 @@ class ProbingPredictor(Predictor):
         """The simulations behind `predict`, with their checks."""
         bare = self.model.across(())
         thetas = {name: _vector(local(self.model, values, name)) for name in self.names}
-        jobs = [lambda n=name: _predict(bare, thetas[n], self.setups[n]) for name in self.names]
+        jobs = [lambda n=name: programs.run(_predict, bare, thetas[n], self.setups[n]) for name in self.names]
         out = dict(zip(self.names, self._side_by_side(jobs, thetas), strict=True))
         for name, run in out.items():
             self._refuse_failed(name, run)
@@ -100,7 +99,7 @@ class ProbingPredictor(Predictor):
                 basis[i] = [path in self.model.source_of(generic, name) for generic in declared]
             felt = np.flatnonzero(basis.any(1))
             for part in _parts(felt, self.settings.tangents):
-                jobs.append(lambda n=name, b=basis[part]: _linearised(bare, thetas[n], self.setups[n], b))
+                jobs.append(lambda n=name, b=basis[part]: programs.run(_linearised, bare, thetas[n], self.setups[n], b))
                 place.append((name, part))
         recordings, tangents = {}, {path: {} for path in paths}
         for (name, part), (run, slopes) in zip(place, self._side_by_side(jobs, thetas), strict=True):
@@ -152,12 +151,10 @@ def _parts(indices: np.ndarray, size: int) -> list[np.ndarray]:
     return np.array_split(indices, -(-len(indices) // size)) if len(indices) else []
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=COMPILER_OPTIONS)
 def _predict(model: Model, theta: Float[Array, " p"], setup: Setup) -> Simulated:
     return simulated(model, dict(zip(model.declared, theta)), setup)
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=COMPILER_OPTIONS)
 def _linearised(
     model: Model, theta: Float[Array, " p"], setup: Setup, basis: Float[Array, "k p"]
 ) -> tuple[Simulated, dict[str, Float[Array, "k ..."]]]:

@@ -145,9 +145,9 @@ def _setup(model, sample, recording, settings, lobe: Lobe | None, touch: Contact
     force_times = np.asarray(recording.channels["force"].time, float)
     marker_times, calm, on, shown = np.zeros(0), np.zeros(clock.frames), None, np.zeros((0, 3))
     if rest is not None:
-        seen = np.isfinite(rest).all(1)
-        # a marker without a rest position can't be predicted: it keeps a place, far from mattering, and gives NaN
-        where = np.where(seen[:, None], rest, points[upper.nodes[0, 0]])
+        values = np.asarray(recording.channels["markers"].values, float)
+        never = ~np.isfinite(values).all(2).any(0)  # not in this recording at all: a place and a NaN prediction will do
+        where = np.where((np.isfinite(rest).all(1) | ~never)[:, None], rest, points[upper.nodes[0, 0]])
         placed = attach(where, points, upper)
         placed = nearest_nodes(where, points, upper) if settings.nearest_node else placed
         on = Markers(placed.nodes, placed.weights, rest)

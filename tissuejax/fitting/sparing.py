@@ -5,18 +5,28 @@ judged in standard errors, because the last digits of a simulation are numerical
 """
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
 from tissuejax.errors import UnstableSimulation
-from tissuejax.fitting.levenberg_marquardt import Descent, Linearised
+from tissuejax.fitting.levenberg_marquardt import Descent
 
 Residuals = Callable[[Float[np.ndarray, " p"]], Float[np.ndarray, " n"]]
+Jacobian = Callable[[Float[np.ndarray, " p"]], Float[np.ndarray, "n p"]]
+
+
+class Ended(NamedTuple):
+    """How a descent went, with the last residuals and Jacobian, which nobody should have to simulate again."""
+
+    descent: Descent
+    residuals: Float[np.ndarray, " n"]
+    jacobian: Float[np.ndarray, "n p"]
 
 
 def sparing(
-    linearised: Linearised,
+    jacobian: Jacobian,
     residuals: Residuals,
     y: Float[np.ndarray, " p"],
     *,
@@ -24,62 +34,73 @@ def sparing(
     fraction: float = 0.1,
     longest: float = 1.0,
     on_accept: Callable[[int, float, np.ndarray], None] | None = None,
-) -> Descent:
+) -> Ended:
     """Minimise half the sum of squares of the residuals from `y`.
 
     Args:
-        linearised: residuals and Jacobian at y.
-        residuals: residuals alone; non-finite ones or an `UnstableSimulation` are a rejected step.
+        jacobian: derivative of the residuals at y; a cheaper simulation's derivative serves as well.
+        residuals: residuals at y; non-finite ones or an `UnstableSimulation` are a rejected step.
         y: start, in coordinates of order one (logarithms or scaled parameters).
         max_steps: Jacobians at most.
         fraction: converged once the next step is shorter than this many standard errors (scaled by the misfit).
         longest: steps are shortened so that no coordinate moves farther.
-        on_accept: called with the number of evaluations, cost and point of every accepted step (progress, checkpoint).
+        on_accept: called with the number of runs, cost and point of every accepted step (progress, checkpoint).
+
+    Raises:
+        UnstableSimulation: the start itself can't be simulated.
     """
     y = np.asarray(y, float)
-    damping, n, trace, reason = 1e-4, 0, [], ""
+    r, n, damping, reason, trace = residuals(y), 1, 1e-4, "", []
+    J = np.full((len(r), len(y)), np.nan)
+    cost = 0.5 * float(r @ r)
 
-    def trial(at):
-        try:
-            r = residuals(at)
-        except UnstableSimulation:
-            return np.inf
-        return 0.5 * float(r @ r) if np.isfinite(r).all() else np.inf
+    def ended(reason):
+        return Ended(Descent(y, cost, reason == "converged", reason, n, trace), r, J)
 
-    cost = np.inf
+    if not np.isfinite(r).all():
+        return ended("the simulation has no finite prediction at the start")
     for _ in range(max_steps):
-        r, J = linearised(y)
-        n += 1
-        if not (np.isfinite(r).all() and np.isfinite(J).all()):
-            return Descent(y, cost, False, "the simulation has no finite prediction or derivative here", n, trace)
-        cost = 0.5 * float(r @ r)
         trace.append((cost, y))
         if on_accept is not None:
             on_accept(n, cost, y)
+        J = jacobian(y)
+        n += 1
+        if not np.isfinite(J).all():
+            return ended("the simulation has no finite derivative here")
         gradient, normal = J.T @ r, J.T @ J
         size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
         variance = max(2 * cost / max(len(r) - len(y), 1), 1e-300)
         accepted = False
         for _ in range(8):
             # damping relative to the curvature of each coordinate: Marquardt's scaling
-            step = -np.linalg.solve(normal + damping * np.diag(size**2), gradient)
+            step = -np.linalg.lstsq(normal + damping * np.diag(size**2), gradient, rcond=1e-14)[0]
             step *= min(1.0, longest / max(np.abs(step).max(), 1e-300))
             errors = np.sqrt(step @ normal @ step / variance)
             promised = -(gradient @ step + 0.5 * step @ normal @ step)
             if errors < fraction or promised < 1e-9 * cost:
-                reason = "converged"
-                break
-            new = trial(y + step)
+                return ended("converged")
+            new = _trial(residuals, y + step)
             n += 1
-            if new < cost and cost - new > 1e-3 * promised:
-                damping = max(damping / 10, 1e-8) if cost - new > 0.5 * promised else damping * 2
-                y, accepted = y + step, True
+            after = 0.5 * float(new @ new) if new is not None else np.inf
+            if cost - after > 1e-3 * promised:
+                damping = max(damping / 10, 1e-8) if cost - after > 0.5 * promised else damping * 2
+                y, r, cost, accepted = y + step, new, after, True
                 break
             damping = max(10 * damping, 1e-3)
-        if reason:
-            break
         if not accepted:
             reason = "no nearby point is better, though the derivatives promise one"
             break
-    converged = reason == "converged"
-    return Descent(trace[-1][1], trace[-1][0], converged, reason or f"no convergence after {n} runs", n, trace)
+        if (
+            errors < 0.5 and fraction >= 0.1
+        ):  # the Jacobian is as good here: one more chord step would be below 0.1 errors
+            trace.append((cost, y))
+            return ended("converged")
+    return ended(reason or f"no convergence after {n} runs")
+
+
+def _trial(residuals: Residuals, y: Float[np.ndarray, " p"]) -> Float[np.ndarray, " n"] | None:
+    try:
+        r = residuals(y)
+    except UnstableSimulation:
+        return None
+    return r if np.isfinite(r).all() else None

@@ -1,0 +1,224 @@
+"""Fit of probings: few simulations, coarse derivatives under fine residuals, and errors that include the numerical one.
+
+The derivatives come from a run twice as fast (half the steps), the residuals from the run that counts: Gauss-Newton
+needs no better direction, and a Jacobian costs five forward runs. Standard errors hold two parts: noise, and how far
+the estimate moves when mesh, step and penalty are changed (a linear shift: the change of the prediction through the
+Jacobian).
+"""
+
+import hashlib
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from tissuejax import storage
+from tissuejax.errors import InputError
+from tissuejax.experiments.probing_predictor import ProbingPredictor
+from tissuejax.fitting.advice import warnings_of
+from tissuejax.fitting.problem import Problem
+from tissuejax.fitting.result import Fit, Iterate
+from tissuejax.fitting.scores import scores
+from tissuejax.fitting.sparing import sparing
+from tissuejax.fitting.stability import recorded_stability
+from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
+from tissuejax.progress import Progress, Silent
+
+METHOD = "sparing"
+
+
+@dataclass(frozen=True)
+class ProbedFit:
+    """A fit of probings and what numerics did to it.
+
+    Attributes:
+        fit: the result; its standard errors include the numerical part.
+        shifts: for each numerical choice changed ("mesh", "step", "penalty"), the shift of each free parameter.
+        numerical: root mean square change of each "recording/channel" by all changes together, SI.
+        noise_std: standard errors from noise alone.
+        simulations: forward runs and Jacobians spent, a run being one recording set.
+    """
+
+    fit: Fit
+    shifts: dict[str, dict[str, float]]
+    numerical: dict[str, float]
+    noise_std: dict[str, float]
+    simulations: dict[str, int]
+
+    def record(self) -> dict:
+        """The contents of result.json."""
+        return self.fit.record() | {
+            "numerical": {"shifts": self.shifts, "rms": self.numerical, "noise_std": self.noise_std},
+            "simulations": self.simulations,
+        }
+
+
+def fit_probed(
+    problem: Problem,
+    *,
+    holdout: tuple[str, ...] = (),
+    numerical: bool = True,
+    checkpoint: Path | None = None,
+    max_steps: int = 12,
+    fraction: float = 0.1,
+    progress: Progress | None = None,
+    on_accept: Callable[[int, float, dict[str, float]], None] | None = None,
+) -> ProbedFit:
+    """Estimate the free parameters of a problem whose predictor simulates probings.
+
+    Args:
+        problem: predictor, free parameters, start, noise, bounds, priors.
+        holdout: recordings of the same sample to predict and score only.
+        numerical: estimate the numerical error (three more forward runs).
+        checkpoint: a file that keeps the last accepted values; a fit of the same problem goes on from there.
+        max_steps: Jacobians at most.
+        fraction: converged once the next step is shorter than this many standard errors.
+        progress: told after every run.
+        on_accept: told runs, chi-square and values after every accepted step.
+
+    Raises:
+        UnstableSimulation: the start can't be simulated.
+        InputError: a predictor of other experiments.
+    """
+    fine = problem.predictor
+    if not isinstance(fine, ProbingPredictor):
+        raise InputError("fit_probed takes a predictor of probings; use fit for material tests")
+    begun = time.perf_counter()
+    coarse = replace(problem, predictor=fine.with_settings(fine.settings.coarse))
+    box, spent = problem.box, {"forward": 0, "jacobian": 0}
+    kept = Checkpoint(checkpoint, problem)
+    start = kept.values()
+    with (progress or Silent()).stage(f"fitting {', '.join(fine.names)}", None) as stage:
+
+        def residuals(y):
+            spent["forward"] += 1
+            stage.advance(note="simulation")
+            return problem.residuals(problem.values(box.bounded(y)[0]))
+
+        def jacobian(y):
+            spent["jacobian"] += 1
+            stage.advance(note="derivatives")
+            x, slope = box.bounded(y)
+            return coarse.linearised(problem.values(x))[1] * slope
+
+        def accepted(n, cost, y):
+            values = problem.values(box.bounded(y)[0])
+            kept.keep(values)
+            stage.advance(0, note=f"chi-square {2 * cost:.5g}")
+            if on_accept is not None:
+                on_accept(n, 2 * cost, values)
+
+        y = box.free(problem.vector(start))
+        descent, r, J = sparing(jacobian, residuals, y, max_steps=max_steps, fraction=fraction, on_accept=accepted)
+        x, slope = box.bounded(descent.y)
+        values, J = problem.values(x), J / slope
+        kept.keep(values)
+        fitted = dict(fine.predict(values))
+        stage.advance(note="held out")
+        held = dict(fine.of(holdout).predict(values)) if holdout else {}
+        shifts, sizes = numerical_shifts(problem, values, fitted, J) if numerical else ({}, {})
+    noise_part = _noise_part(problem, x, J, r)
+    spread = _with_shifts(noise_part, [np.array(list(s.values())) for s in shifts.values()])
+    measured = fine.sample.recordings
+    std = dict(problem.noise.std)
+    for name in holdout:
+        for channel, series in measured[name].channels.items():
+            std[f"{name}/{channel}"] = series.noise_std or std.get(f"{fine.names[0]}/{channel}", 1.0)
+    found = Fit(
+        problem=problem,
+        status="converged" if descent.converged else descent.reason,
+        values=values,
+        uncertainty=spread,
+        at_bound={p: side for p, side in zip(problem.free, box.at_bound(x), strict=True) if side},
+        chi2=2 * descent.cost,
+        channels=scores(measured, fitted, std),
+        holdout=scores(measured, held, std),
+        predictions=fitted | held,
+        trace=[Iterate(i, 2 * c, problem.values(box.bounded(y)[0])) for i, (c, y) in enumerate(descent.trace, 1)],
+        stability=recorded_stability(fine, values),
+        starts=[2 * descent.cost],
+        n_evaluations=descent.n_evaluations,
+        seconds=time.perf_counter() - begun,
+        method=METHOD,
+    )
+    found.warnings.extend(warnings_of(found))
+    kept.done()
+    noise_std = dict(zip(problem.free, map(float, noise_part.std), strict=True))
+    return ProbedFit(found, shifts, sizes, noise_std, spent)
+
+
+def numerical_shifts(
+    problem: Problem, values: Mapping[str, float], predicted: Mapping, jacobian: Float[np.ndarray, "n p"]
+) -> tuple[dict[str, dict[str, float]], dict[str, float]]:
+    """How far the estimate would move on another mesh, step and penalty, and how far the prediction moves.
+
+    Data that stay while the prediction changes by d move the estimate by -(J'J)^-1 J'd.
+
+    Args:
+        problem: with the predictor whose settings are varied.
+        values: the estimate.
+        predicted: its prediction by recording.
+        jacobian: of the residuals to the free parameters, at the estimate.
+    """
+    predictor = problem.predictor
+    shifts, squares = {}, {}
+    for choice, settings in predictor.settings.varied.items():
+        other = predictor.with_settings(settings).predict(values)
+        change = np.zeros(len(jacobian))
+        for key, rows in problem.rows.items():
+            name, channel = key
+            after, before = (np.asarray(p[name].channels[channel].values, float) for p in (other, predicted))
+            d = (after - before).ravel()[problem.seen[key]]
+            change[rows] = d / problem.sigma(key)
+            squares[f"{name}/{channel}"] = squares.get(f"{name}/{channel}", 0.0) + float(np.mean(d**2))
+        move = -np.linalg.lstsq(jacobian, change, rcond=None)[0]
+        shifts[choice] = dict(zip(problem.free, map(float, move), strict=True))
+    return shifts, {key: value**0.5 for key, value in squares.items()}
+
+
+def _noise_part(problem: Problem, x, J, r) -> Uncertainty:
+    declared = problem.predictor.model.parameters
+    widening = max(1.0, float(np.sqrt(float(r @ r) / max(1, len(r) - len(x)))))
+    scale = np.array([declared[path].typical for path in problem.free])
+    labels = tuple(path.removeprefix("energy.") for path in problem.free)
+    return uncertainty(J, x, scale, labels, tuple(declared[p].unit for p in problem.free), widening)
+
+
+def _with_shifts(noise: Uncertainty, shifts: list[Float[np.ndarray, " p"]]) -> Uncertainty:
+    """Numerical shifts added in quadrature to what noise leaves open."""
+    covariance = noise.covariance + sum((np.outer(s, s) for s in shifts), np.zeros_like(noise.covariance))
+    std = np.where(np.isfinite(noise.std), np.sqrt(np.diag(covariance)), np.inf)
+    return Uncertainty(std, covariance, covariance / np.outer(std, std), noise.condition, noise.sentences)
+
+
+class Checkpoint:
+    """The last accepted values of a fit on disk, with a mark of the problem they belong to."""
+
+    def __init__(self, path: Path | None, problem: Problem):
+        self.path, self.problem = (None if path is None else Path(path)), problem
+        parts = (problem.predictor.model, problem.predictor.names, problem.free, problem.predictor.settings)
+        numbers = [problem.measured[k].tobytes() for k in problem.channels]
+        self.mark = hashlib.sha256(repr(parts).encode() + b"".join(numbers)).hexdigest()
+
+    def values(self) -> dict[str, float]:
+        """Where to begin: the kept values if they are of this problem, else its start."""
+        start = {path: float(v) for path, v in self.problem.start.items()}
+        if self.path is None or not self.path.exists():
+            return start
+        import json
+
+        kept = json.loads(self.path.read_text())
+        return start | kept["values"] if kept.get("mark") == self.mark else start
+
+    def keep(self, values: Mapping[str, float]) -> None:
+        """Note accepted values."""
+        if self.path is not None:
+            storage.write_json(self.path, {"mark": self.mark, "values": dict(values)})
+
+    def done(self) -> None:
+        """The fit has ended: nothing to resume."""
+        if self.path is not None:
+            self.path.unlink(missing_ok=True)
