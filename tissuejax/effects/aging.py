@@ -8,7 +8,9 @@ from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
 from tissuejax.effects.material_test import MaterialTest, Stress
+from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
+from tissuejax.recordings.recording import Channel
 
 
 class Aging(Effect):
@@ -33,3 +35,11 @@ class Aging(Effect):
 
     def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:
         return state.scaled(jnp.exp(p["rate"] * (test.start + test.elapsed)))
+
+    def channels(
+        self, p: Mapping[str, Array], test: ProbingTest, channels: Mapping[str, Channel]
+    ) -> Mapping[str, Channel]:
+        # a probe in given places: stiffness alone, of all the tissue alike, changes the force and no displacement
+        seen = channels["force"]
+        factor = jnp.exp(p["rate"] * (test.start + seen.time))
+        return {**channels, "force": Channel(seen.time, factor[:, None] * seen.values, seen.unit, seen.noise_std)}

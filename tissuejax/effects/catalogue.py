@@ -17,3 +17,13 @@ def effect(name: str, **options) -> Effect:
         InputError: no such effect; the nearest names are offered.
     """
     return lookup("effect", name, effects())(**options)
+
+
+def suited(name: str, kind: str, **options) -> Effect:
+    """The effect called `name` as it acts in experiments of `kind`: some have other parameters in a probing.
+
+    Raises:
+        InputError: no such effect, or one that can't act there.
+    """
+    member = lookup("effect", name, effects(kind))
+    return member(**options, **({"kind": kind} if "kind" in member.__dataclass_fields__ else {}))

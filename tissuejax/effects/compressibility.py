@@ -3,12 +3,16 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
 from tissuejax.effects.history import fading
 from tissuejax.effects.material_test import MaterialTest
+from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
+from tissuejax.tled.history import Prony
+from tissuejax.tled.scene import Scene
 
 
 class Compressibility(Effect):
@@ -43,3 +47,13 @@ class Compressibility(Effect):
     def volume(self, p: Mapping[str, Array], test: MaterialTest, mean: Float[Array, " n"]) -> Float[Array, " n"]:
         undrained = fading(test.time, mean[:, None], p["time"])[:, 0]
         return p["immediate"] * mean + p["drained"] * (mean - undrained)
+
+    def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
+        # a held strain relaxes by g = 1 - 1/(1 + K drained), faster than a stress creeps: time / (1 + K drained)
+        values = scene.tissue.volumetric_values
+        K = scene.tissue.volumetric.bulk_modulus(values)
+        softer = 1.0 / (1.0 + K * p["immediate"])
+        scaled = {k: v / softer if k.startswith("D") else v * softer for k, v in values.items()}
+        more = K * softer * p["drained"]
+        drain = Prony(jnp.atleast_1d(more / (1.0 + more)), jnp.atleast_1d(p["time"] / (1.0 + more)))
+        return scene.put({"tissue.volumetric_values": scaled, "tissue.drain": drain})

@@ -3,17 +3,21 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
 from tissuejax.effects.material_test import MaterialTest
+from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
+from tissuejax.recordings.recording import Channel
 
 
 class Drift(Effect):
     """Reported stress = stress + offset + rate t, t the time since the recording began.
 
-    One offset and one rate for all recordings, or with `separate` of their own for each. A gain of the sensor is NOT
+    One offset and one rate for all recordings, or with `separate` of their own for each; with `kind` "probing" for
+    each axis of the force. A gain of the sensor is NOT
     here: it can't be told from a stiffness scale by any data of one sample.
 
     Revealed by stress at rest, before loading and after unloading. Blind: none that has samples at rest; without them
@@ -26,12 +30,28 @@ class Drift(Effect):
     blind: ClassVar[str] = "recordings without samples at rest; a wrong gain is never seen"
     source: ClassVar[str] = "linear sensor model"
     order: ClassVar[int] = 0
-    amplitudes: ClassVar[tuple[str, ...]] = ("offset", "rate")
     separate: bool = False
+    kind: str = "homogeneous"
+
+    @property
+    def amplitudes(self) -> tuple[str, ...]:
+        """Offset and rate; of each axis of the force in a probing."""
+        return (
+            ("offset", "rate")
+            if self.kind == "homogeneous"
+            else tuple(f"{a}_{c}" for a in ("offset", "rate") for c in "xyz")
+        )
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         each = self.separate
+        if self.kind == "probing":
+            sizes = {"offset": ("N", 3e-3, "zero error of the force"), "rate": ("N/s", 3e-4, "drift of the force")}
+            return tuple(
+                Parameter(f"{name}_{c}", unit, 0.0, scale=scale, each=each, meaning=f"{meaning} along {c}")
+                for name, (unit, scale, meaning) in sizes.items()
+                for c in "xyz"
+            )
         return (
             Parameter("offset", "Pa", 0.0, scale=10.0, each=each, meaning="zero error of the load cell"),
             Parameter("rate", "Pa/s", 0.0, scale=1.0, each=each, meaning="drift of the load cell"),
@@ -42,3 +62,13 @@ class Drift(Effect):
     ) -> Float[Array, "n ..."]:
         drift = p["offset"] + p["rate"] * test.elapsed
         return stress + (drift if stress.ndim == 1 else drift[:, None])
+
+    def channels(
+        self, p: Mapping[str, Array], test: ProbingTest, channels: Mapping[str, Channel]
+    ) -> Mapping[str, Channel]:
+        if self.kind != "probing":
+            return channels
+        seen = channels["force"]
+        offset, rate = (jnp.stack([jnp.asarray(p[f"{name}_{c}"]) for c in "xyz"]) for name in ("offset", "rate"))
+        force = seen.values + offset + rate * seen.time[:, None]
+        return {**channels, "force": Channel(seen.time, force, seen.unit, seen.noise_std)}

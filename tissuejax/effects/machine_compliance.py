@@ -9,7 +9,9 @@ from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect, Respond
 from tissuejax.effects.material_test import MaterialTest
+from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
+from tissuejax.tled.scene import Scene
 
 
 class MachineCompliance(Effect):
@@ -48,3 +50,6 @@ class MachineCompliance(Effect):
             return x - (x + share * stress - drive) / (1 + share * slope), None
 
         return jax.lax.scan(newton, drive, None, length=4)[0]
+
+    def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
+        return scene.put({"probe.compliance": p["compliance"]})

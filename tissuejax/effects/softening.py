@@ -10,7 +10,10 @@ from jaxtyping import Array
 from tissuejax.effects.effect import Effect
 from tissuejax.effects.history import running_peak
 from tissuejax.effects.material_test import MaterialTest, Stress
+from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
+from tissuejax.tled.history import Damage
+from tissuejax.tled.scene import Scene
 
 
 class Softening(Effect):
@@ -57,3 +60,7 @@ class Softening(Effect):
         if self.loading:
             eta = eta * (1 + p["d"] * jnp.expm1(-peak / p["m"]))
         return state.scaled(eta)
+
+    def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
+        zero = jnp.zeros_like(jnp.asarray(p["r"]))
+        return scene.put({"tissue.damage": Damage(p.get("d", zero), p["m"], p["r"], p["beta"])})

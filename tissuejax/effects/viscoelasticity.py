@@ -11,7 +11,10 @@ from jaxtyping import Array
 from tissuejax.effects.effect import Effect
 from tissuejax.effects.history import fading
 from tissuejax.effects.material_test import MaterialTest, Stress
+from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
+from tissuejax.tled.history import Prony
+from tissuejax.tled.scene import Scene
 
 
 class Viscoelasticity(Effect):
@@ -76,3 +79,8 @@ class Viscoelasticity(Effect):
         tau = jnp.stack([jnp.asarray(p[f"tau{i}"]) for i in self._numbers])
         h = jax.vmap(lambda t: fading(test.time, s, t))(tau)
         return state.replaced(s - jnp.tensordot(g, s - h, 1))
+
+    def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
+        g = jnp.stack([jnp.asarray(p[f"g{i}"]) for i in self._numbers])
+        tau = jnp.stack([jnp.asarray(p[f"tau{i}"]) for i in self._numbers])
+        return scene.put({"tissue.prony": Prony(g, tau)})

@@ -6,6 +6,7 @@ none; Holzapfel 2000, 6.10; Simo 1987), and S = (1 - d) S0 with d = amount (1 - 
 """
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -18,14 +19,24 @@ class Prony(eqx.Module):
 
 
 class Damage(eqx.Module):
-    """Softening: the isochoric stress loses up to `amount` (below 1) as the greatest energy passes `scale`, Pa."""
+    """Softening: the isochoric stress loses up to `amount` (below 1) as the greatest energy passes `scale`, Pa.
+
+    With `recoverable` r it also loses, below the greatest energy, r erf((greatest - psi) / (scale + growth greatest)),
+    the pseudo-elastic law of Ogden & Roxburgh 1999, eq. 5.1.
+    """
 
     amount: Float[Array, ""]
     scale: Float[Array, ""]
+    recoverable: Float[Array, ""] | None = None
+    growth: Float[Array, ""] | float = 0.0
 
-    def factor(self, greatest: Float[Array, " E"]) -> Float[Array, " E"]:
-        """1 - d."""
-        return 1.0 - self.amount * (1.0 - jnp.exp(-greatest / self.scale))
+    def factor(self, greatest: Float[Array, " E"], psi: Float[Array, " E"]) -> Float[Array, " E"]:
+        """1 - d, from the greatest energy so far and the energy now, Pa."""
+        kept = 1.0 - self.amount * (1.0 - jnp.exp(-greatest / self.scale))
+        if self.recoverable is None:
+            return kept
+        below = jax.scipy.special.erf((greatest - psi) / (self.scale + self.growth * greatest))
+        return kept * (1.0 - self.recoverable * below)
 
 
 def relax(prony: Prony, q: list, S0: tuple, step: Float[Array, ""]) -> tuple[list, tuple]:

@@ -39,6 +39,7 @@ class History(NamedTuple):
 
     relaxed: list | None
     greatest: Float[Array, " E"] | None
+    drained: list | None = None
 
 
 def mesh(scene: Scene) -> Mesh:
@@ -71,14 +72,17 @@ def add(f: Float[Array, "... k E"], cells: Int[Array, "k E"], count: int) -> Flo
 def rest(scene: Scene, mesh: Mesh) -> History:
     """The memory of tissue that has been at rest for ever in its settled shape."""
     tissue, zero = scene.tissue, jnp.zeros_like(mesh.stiffness)
-    relaxed = greatest = None
+    relaxed = greatest = drained = None
     if tissue.prony is not None or tissue.damage is not None:
         u = settled(scene)
         F, _ = scene.body.element.gradient(mesh.reference, take(u, mesh.cells))
         psi, S = isochoric(scene, mesh, cauchy_green(F))
         relaxed = None if tissue.prony is None else [tuple(S) for _ in range(len(tissue.prony.g))]
         greatest = None if tissue.damage is None else jnp.maximum(zero, psi)
-    return History(relaxed, greatest)
+    if tissue.drain is not None:
+        F, _ = scene.body.element.gradient(mesh.reference, take(settled(scene), mesh.cells))
+        drained = [_volumetric_gradient(scene, mesh, cauchy_green(F)) for _ in range(len(tissue.drain.g))]
+    return History(relaxed, greatest, drained)
 
 
 def settled(scene: Scene) -> Float[Array, "3 N"]:
@@ -139,20 +143,23 @@ def stress(scene: Scene, mesh: Mesh, C: Sym, history: History, step) -> tuple[tu
     For elements with averaged pressure the isochoric part only.
     """
     tissue, averaged = scene.tissue, scene.body.element.averaged_pressure
-    if tissue.prony is None and tissue.damage is None and not averaged:
+    if tissue.prony is None and tissue.damage is None and tissue.drain is None and not averaged:
         return second_piola(jax.grad(lambda C: jnp.sum(mesh.stiffness * energy_density(scene, C)))(C)), history
     psi, S = isochoric(scene, mesh, C)
-    relaxed, greatest = history
+    relaxed, greatest, drained = history
     if tissue.damage is not None:
         greatest = jnp.maximum(greatest, psi)
-        factor = tissue.damage.factor(greatest / jnp.where(mesh.stiffness > 0, mesh.stiffness, 1.0))
+        bare = jnp.where(mesh.stiffness > 0, mesh.stiffness, 1.0)
+        factor = tissue.damage.factor(greatest / bare, psi / bare)
         S = tuple(factor * s for s in S)
     if tissue.prony is not None:
         relaxed, S = relax(tissue.prony, relaxed, S, step)
     if not averaged:
         U = _volumetric_gradient(scene, mesh, C)
+        if tissue.drain is not None:
+            drained, U = relax(tissue.drain, drained, U, step)
         S = tuple(s + p for s, p in zip(S, U, strict=True))
-    return S, History(relaxed, greatest)
+    return S, History(relaxed, greatest, drained)
 
 
 def _volumetric_gradient(scene, mesh, C):

@@ -59,6 +59,7 @@ class Tissue(eqx.Module):
         added: further energies, callables `Strain -> psi (E,)` (eqx.Modules whose leaves are traced), e.g. a fibre
             family; neutral: amplitude 0.
         prony: relaxing part of the isochoric stress; neutral g = 0.
+        drain: relaxing part of the volumetric stress (fluid that leaves; hexes only); neutral g = 0.
         damage: softening by the greatest energy so far; neutral amount 0.
         capsule: shear modulus times thickness of a membrane on all boundary facets, N/m; neutral 0.
     """
@@ -71,6 +72,7 @@ class Tissue(eqx.Module):
     stiffness: Float[Array, " E"] | None = None
     added: tuple[Any, ...] = ()
     prony: Prony | None = None
+    drain: Prony | None = None
     damage: Damage | None = None
     capsule: Float[Array, ""] | None = None
 
