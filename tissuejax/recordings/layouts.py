@@ -46,7 +46,6 @@ class Scalar:
     unit: str
     owner: str = ""
     optional: bool = True
-    zero: bool = False
 
     @property
     def path(self) -> str:

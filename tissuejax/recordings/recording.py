@@ -33,9 +33,11 @@ class Recording(eqx.Module):
     Attributes:
         name: group name in the file.
         experiment: the kind ("uniaxial", "probing", ...).
-        inputs: what was done: "time", "stretch" (n,) or (n,2), "shear"; probing: "probe/time", "probe/position".
+        inputs: what was done: "time", "stretch" (n,) or (n,2), "shear"; probing: "probe/time", "probe/position",
+            where recorded "contact/time" and "contact/voltage"; cutting: "blade/time", "blade/tip", "depth".
         channels: what was measured: "nominal_stress"; probing: "force" (n,3), "markers" (m,k,3).
-        attributes: scalars and small arrays: "start", "area", "height", "diameter", "direction", "probe/radius".
+        attributes: scalars and small arrays: "start", "area", "height", "diameter", "direction", "probe/radius",
+            "stretch/noise_std", "axial_stretch" (simple shear), "blade/thickness", "blade/profile".
     """
 
     name: str = eqx.field(static=True)
