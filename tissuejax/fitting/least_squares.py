@@ -7,6 +7,7 @@ lengths repeat.
 
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from tissuejax.fitting.losses import soften
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
+from tissuejax.fitting.separable import NotSeparable, projected_descent, separable
 from tissuejax.fitting.stability import recorded_stability
 from tissuejax.fitting.starts import fitted_moduli, variations
 from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
@@ -49,8 +51,14 @@ def descend(
         on_accept: told evaluations, chi-square and values after every accepted step.
         to_beat: cost another start reached.
     """
+    x = problem.vector(start if start is not None else problem.start)
+    if method == "levenberg-marquardt" and separable(problem):
+        heard = None if on_accept is None else lambda n, cost, x: on_accept(n, 2 * cost, problem.values(x))
+        options = {"max_steps": max_steps, "tolerance": tolerance, "to_beat": to_beat}
+        with suppress(NotSeparable):
+            return projected_descent(problem, x, on_accept=heard, **options)
     box = problem.box
-    y = box.free(problem.vector(start if start is not None else problem.start))
+    y = box.free(x)
 
     def report(n, cost, y):
         on_accept(n, 2 * cost, problem.values(box.bounded(y)[0]))
@@ -103,7 +111,9 @@ def fit(
         NotConverged: no start led to a finite misfit.
     """
     begun = time.perf_counter()
-    first = dict(problem.start) | dict(start or {}) if start is not None else fitted_moduli(problem, problem.start)
+    first = dict(problem.start) | dict(start or {})
+    if start is None and not separable(problem):
+        first = fitted_moduli(problem, first)
     tries = [first, *variations(problem, first, multistart - 1, seed)]
     n, ends = 0, []
     options = {"method": method, "max_steps": max_steps, "on_accept": on_accept}

@@ -100,9 +100,9 @@ def levenberg_marquardt(
         on_accept: called with the number of evaluations, cost and point of every accepted step (progress, checkpoint).
         to_beat: cost that another start reached; a search that creeps well above it is given up.
     """
-    p = len(y)
+    p, asked = len(y), np.asarray(y, float)
     step, state = _solver(p)
-    r, jacobian = linearised(y)
+    r, jacobian = linearised(asked)
     if not (np.abs(r).max(initial=0) < HUGE and np.isfinite(jacobian).all()):
         return Descent(y, np.inf, False, "the model has no finite prediction at the start", 1)
     norms = np.linalg.norm(jacobian, axis=0)
@@ -122,7 +122,7 @@ def levenberg_marquardt(
         if np.isfinite(trial) and (not trace or not np.array_equal(z, before)):
             drop = cost - trial
             small = small + 1 if drop <= tolerance * trial else 0
-            cost, best = trial, z / scale
+            cost, best = trial, asked
             trace.append((cost, best))
             gain = _promise(rs, js)
             if on_accept is not None:
@@ -142,7 +142,8 @@ def levenberg_marquardt(
         if reason:
             return Descent(best, cost, reason == "converged", reason, n, trace)
         z_eval = z_next
-        r, jacobian = linearised(z_eval / scale)
+        asked = z_eval / scale
+        r, jacobian = linearised(asked)
         n += 1
 
 

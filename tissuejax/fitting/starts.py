@@ -6,6 +6,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from tissuejax.fitting.problem import Problem
+from tissuejax.fitting.separable import separable
 
 LEAST = 1e-3  # share of the data that a modulus accounts for at least, at the start
 SPREAD = 0.7  # standard deviation of the logarithm (or share of the scale) by which further starts vary
@@ -57,4 +58,4 @@ def variations(problem: Problem, first: Mapping[str, float], n: int, seed: int) 
             if np.isfinite(upper - lower) and not lower < value < upper:
                 value = lower + (upper - lower) * float(rng.uniform(0.02, 0.98))
             values[path] = float(np.clip(value, lower, upper))
-        yield fitted_moduli(problem, values)
+        yield values if separable(problem) else fitted_moduli(problem, values)

@@ -49,7 +49,7 @@ class Box:
         self.scale = np.asarray(scale, float)
         low, high = np.isfinite(self.lower), np.isfinite(self.upper)
         self.both, self.only_lower, self.only_upper = low & high, low & ~high, high & ~low
-        self.wide = ~low & ~high & np.asarray(wide if wide is not None else [False] * len(self.scale))
+        self.wide = ~low & ~high & np.asarray(wide if wide is not None else [False] * len(self.scale), bool)
         self.small = DECADES * self.scale
         self.span = np.where(self.both, self.upper - self.lower, self.scale)
         self.span = np.where(np.isfinite(self.span), self.span, self.scale)

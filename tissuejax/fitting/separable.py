@@ -1,0 +1,149 @@
+"""Variable projection: where stress is linear in the moduli they are solved for, and only the rest is searched.
+
+At every trial of the other parameters (exponents, limits, shares, times) the moduli follow from one linear
+least-squares problem, bounds kept, so the search runs in fewer dimensions and past the long curved valleys in which a
+modulus trades off against an exponent. The Jacobian of the projected residual is Kaufman's, (1 - P) J, P projecting
+on the columns of the moduli: the full Jacobian at the solved moduli less what they can absorb. Source: Golub &
+Pereyra 1973; Kaufman 1975, BIT 15. Linearity is not assumed but checked at every trial; where it fails,
+`NotSeparable` hands over to the full search.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import lsq_linear
+
+from tissuejax.fitting.levenberg_marquardt import HUGE, Descent, levenberg_marquardt
+from tissuejax.fitting.problem import Problem
+from tissuejax.fitting.transforms import Box
+
+LINEAR = 1e-6  # how far, as a share of its norm, the residual may differ from the linear forecast
+CUTOFF = 1e-12  # singular values below this share are not solved for
+
+
+class NotSeparable(Exception):
+    """The prediction is not linear in the moduli after all."""
+
+
+def separable(problem: Problem) -> bool:
+    """Whether projection is worth trying: plain squares, free moduli without priors, no stability rows."""
+    return (
+        problem.loss == "squares"
+        and not problem.stiffness
+        and bool(problem.moduli)
+        and not any(path in problem.priors for path in problem.moduli)
+    )
+
+
+class Projection:
+    """Residual and Jacobian in the remaining parameters, the moduli solved for at each trial."""
+
+    def __init__(self, problem: Problem, x: Float[np.ndarray, " p"]):
+        self.problem = problem
+        self.linear = np.array([path in problem.moduli for path in problem.free])
+        self.x, self.best, self.n = x.copy(), np.inf, 0
+        rest = [path for path in problem.free if path not in problem.moduli]
+        ends = [problem.bound(path) for path in rest]
+        scale = [problem.scale(path) for path in rest]
+        self.box = Box([a for a, _ in ends], [b for _, b in ends], scale)
+        self.low = np.array([problem.bound(path)[0] for path in problem.moduli])
+        self.high = np.array([problem.bound(path)[1] for path in problem.moduli])
+        self.points: dict[bytes, np.ndarray] = {}
+
+    def __call__(self, y: Float[np.ndarray, " q"]) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n q"]]:
+        """Projected residual and Kaufman's Jacobian at y; no Jacobian (zeros) where the trial is worse than the
+        best.
+        """
+        x, slope = self.x.copy(), np.ones(0)
+        if len(y):
+            x[~self.linear], slope = self.box.bounded(y)
+        r, jacobian = self._linearised(x)
+        if not _finite(r, jacobian):
+            return np.full_like(r, np.inf), np.zeros((len(r), len(y)))
+        moduli, forecast, _ = self.solve(r, jacobian[:, self.linear], x[self.linear])
+        x[self.linear] = moduli
+        self.points[y.tobytes()] = x
+        if forecast @ forecast > self.best:
+            return forecast, np.zeros((len(r), len(y)))
+        r, jacobian = self._linearised(x)
+        if not _finite(r, jacobian):
+            return np.full_like(r, np.inf), np.zeros((len(r), len(y)))
+        if np.linalg.norm(r - forecast) > LINEAR * (np.linalg.norm(forecast) + 1e-3 * np.sqrt(len(r))):
+            raise NotSeparable
+        self.x, self.best = x, float(r @ r)
+        return r, self._projected(jacobian, x) * slope
+
+    def solve(self, r, columns, now) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Moduli within bounds, the residual they give, and which are free of their bounds."""
+        size = np.linalg.norm(columns, axis=0)
+        size = np.where(size > 0, size, 1.0)
+        target = columns @ now - r
+        solved = np.linalg.lstsq(columns / size, target, rcond=CUTOFF)[0] / size
+        inside = (solved >= self.low) & (solved <= self.high)
+        if not inside.all():
+            answer = lsq_linear(columns / size, target, (self.low * size, self.high * size), method="bvls")
+            solved = np.clip(answer.x / size, self.low, self.high)
+            inside = (solved > self.low) & (solved < self.high)
+        return solved, r + columns @ (solved - now), inside
+
+    def _projected(self, jacobian, x) -> np.ndarray:
+        inside = (x[self.linear] > self.low) & (x[self.linear] < self.high)
+        columns, rest = jacobian[:, self.linear][:, inside], jacobian[:, ~self.linear]
+        size = np.linalg.norm(columns, axis=0)
+        columns = columns[:, size > 0] / size[size > 0]
+        if not columns.shape[1]:
+            return rest
+        u, s, _ = np.linalg.svd(columns, full_matrices=False)
+        u = u[:, s > CUTOFF * s[0]]
+        return rest - u @ (u.T @ rest)
+
+    def _linearised(self, x):
+        self.n += 1
+        return self.problem.linearised(self.problem.values(x))
+
+
+def projected_descent(
+    problem: Problem,
+    x: Float[np.ndarray, " p"],
+    *,
+    max_steps: int,
+    tolerance: float,
+    on_accept: Callable[[int, float, np.ndarray], None] | None,
+    to_beat: float,
+) -> Descent:
+    """Minimise from the free parameters `x` (not transformed); `Descent.y` are free parameters too.
+
+    Raises:
+        NotSeparable: the prediction is not linear in the moduli.
+    """
+    projection = Projection(problem, x)
+    y = projection.box.free(x[~projection.linear]) if not projection.linear.all() else np.zeros(0)
+    if not len(y):
+        r, _ = projection(y)
+        good = bool(np.isfinite(r).all())
+        cost, end = (0.5 * float(r @ r), projection.x) if good else (np.inf, x)
+        if good and on_accept is not None:
+            on_accept(projection.n, cost, end)
+        reason = "converged" if good else "the model has no finite prediction at the start"
+        return Descent(end, cost, good, reason, projection.n, [(cost, end)] if good else [])
+
+    def heard(_, cost, y):
+        on_accept(projection.n, cost, projection.points[y.tobytes()])
+
+    found = levenberg_marquardt(
+        projection,
+        y,
+        max_steps=max(1, max_steps // 2),
+        tolerance=tolerance,
+        on_accept=heard if on_accept is not None else None,
+        to_beat=to_beat,
+    )
+    if not found.trace:
+        return Descent(x, found.cost, False, found.reason, projection.n)
+    trace = [(cost, projection.points[y.tobytes()]) for cost, y in found.trace]
+    return Descent(projection.x, found.cost, found.converged, found.reason, projection.n, trace)
+
+
+def _finite(r: np.ndarray, jacobian: np.ndarray) -> bool:
+    return bool(np.abs(r).max(initial=0) < HUGE and np.isfinite(jacobian).all())
