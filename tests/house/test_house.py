@@ -27,7 +27,8 @@ FLOORS = [
     {"diagnosis"},
     {"report"},
     {"challenge"},
-    {"commands", "verbs"},
+    {"verbs"},
+    {"commands"},
     {"cli"},
 ]
 FLOOR_OF = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
