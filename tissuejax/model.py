@@ -64,7 +64,7 @@ class Model(eqx.Module):
         return all(part.isotropic for part in (self.energy, *self.effects))
 
     def active(self, values: Mapping[str, float], wanted: Collection[str] = ()) -> "Model":
-        """Without effects whose amplitudes are all exactly zero: they change nothing, to the last bit, and cost nothing.
+        """Without effects whose amplitudes are all exactly zero: they change no bit, and so cost nothing.
 
         Args:
             values: a number for every path of `declared`.

@@ -55,15 +55,17 @@ class Stress(eqx.Module):
         S: isochoric second Piola-Kirchhoff stress in the test's axes, Pa; entries (n,). No shear out of the plane.
         W: isochoric strain energy, Pa, (n,).
         C: right Cauchy-Green tensor in the test's axes, entries (n,).
+        spherical: what the isochoric projection took away, Pa, (n,): 2 dpsi/dCbar = S + spherical C^-1.
     """
 
     S: Sym
     W: Float[Array, " n"]
     C: Sym
+    spherical: Float[Array, " n"]
 
     def scaled(self, factor: Float[Array, " n"]) -> "Stress":
         """With the stress multiplied at every time; energy and strain stay."""
-        return Stress(Sym(*(factor * s for s in self.S)), self.W, self.C)
+        return Stress(Sym(*(factor * s for s in self.S)), self.W, self.C, factor * self.spherical)
 
     def stacked(self) -> Float[Array, "n 4"]:
         """The components that are not zero: 11, 22, 33, 12."""
@@ -72,4 +74,11 @@ class Stress(eqx.Module):
     def replaced(self, s: Float[Array, "n 4"]) -> "Stress":
         """With the components 11, 22, 33, 12 of `s`."""
         zero = jnp.zeros_like(s[:, 0])
-        return Stress(Sym(s[:, 0], s[:, 1], s[:, 2], s[:, 3], zero, zero), self.W, self.C)
+        return Stress(Sym(s[:, 0], s[:, 1], s[:, 2], s[:, 3], zero, zero), self.W, self.C, self.spherical)
+
+    @property
+    def inverse(self) -> Float[Array, "n 4"]:
+        """Components 11, 22, 33, 12 of C^-1."""
+        C = self.C
+        det = C.xx * C.yy - C.xy * C.xy
+        return jnp.stack([C.yy / det, C.xx / det, 1 / C.zz, -C.xy / det], -1)

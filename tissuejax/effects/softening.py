@@ -11,21 +11,26 @@ from tissuejax.effects.effect import Effect
 from tissuejax.effects.history import running_peak
 from tissuejax.effects.material_test import MaterialTest, Stress
 from tissuejax.effects.probing_test import ProbingTest
+from tissuejax.errors import unknown
 from tissuejax.parameters import Parameter
 from tissuejax.tled.history import Damage
 from tissuejax.tled.scene import Scene
 
+LAWS = {"erf": jax.scipy.special.erf, "tanh": jnp.tanh}
+
 
 class Softening(Effect):
-    """S = eta S_e, eta = 1 - r erf((W_max - W) / (m + beta W_max)), W_max the largest strain energy so far.
+    """S = eta S_e, eta = 1 - r f((W_max - W) / (m + beta W_max)), W_max the largest strain energy so far.
 
-    Pseudo-elastic damage; r is the share lost far below the largest load (Ogden and Roxburgh write 1/r for it),
-    m an energy, beta how far the scale grows with the load. The first loading is undamaged. With `loading` the virgin
-    path softens as well, eta (1 - d (1 - exp(-W_max/m))), d the share lost (discontinuous damage).
+    Pseudo-elastic damage; f is `law`, "erf" (Ogden and Roxburgh) or "tanh" (Dorfmann and Ogden); r is the share lost
+    far below the largest load (Ogden and Roxburgh write 1/r for it), m an energy, beta how far the scale grows with
+    the load. The first loading is undamaged. With `loading` the virgin path softens as well, eta (1 - d (1 -
+    exp(-W_max/m))), d the share lost (discontinuous damage).
 
     Revealed by unloading below loading, with no relaxation in holds, and by reloading along the unloading path up to
     the former largest load. Blind: monotonic loading. Each recording starts undamaged.
-    Source: Ogden and Roxburgh 1999, Proc. R. Soc. A 455, eq. 5.1, as extended in ABAQUS (beta); Simo 1987, CMAME 60.
+    Source: Ogden and Roxburgh 1999, Proc. R. Soc. A 455, eq. 5.1, as extended in ABAQUS (beta); Dorfmann and Ogden
+    2003, Int. J. Solids Struct. 40 (tanh); Simo 1987, CMAME 60.
     """
 
     name: ClassVar[str] = "softening"
@@ -35,6 +40,11 @@ class Softening(Effect):
     source: ClassVar[str] = "Ogden and Roxburgh 1999, eq. 5.1; Simo 1987"
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"m": (0.005, 0.02, 0.08, 0.3)}
     loading: bool = False
+    law: str = "erf"
+
+    def __check_init__(self):
+        if self.law not in LAWS:
+            raise unknown("law of softening", self.law, LAWS)
 
     @property
     def amplitudes(self) -> tuple[str, ...]:
@@ -56,7 +66,7 @@ class Softening(Effect):
 
     def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:
         peak = running_peak(state.W)
-        eta = 1 - p["r"] * jax.scipy.special.erf((peak - state.W) / (p["m"] + p["beta"] * peak))
+        eta = 1 - p["r"] * LAWS[self.law]((peak - state.W) / (p["m"] + p["beta"] * peak))
         if self.loading:
             eta = eta * (1 + p["d"] * jnp.expm1(-peak / p["m"]))
         return state.scaled(eta)

@@ -20,9 +20,12 @@ from tissuejax.tled.scene import Scene
 class Viscoelasticity(Effect):
     """S(t) = S_e(t) - sum_i g_i (S_e - h_i), h_i the past of S_e fading with tau_i (quasi-linear viscoelasticity).
 
-    S_e is the elastic isochoric PK2 stress. The energy's moduli are INSTANTANEOUS ones; the long-term stress is (1 -
-    sum_i g_i) of it (`long_term`). A recording starts from rested tissue. `terms` relaxation times lie, to start
-    with, in equal parts of the decades from `shortest` to `longest` seconds.
+    S_e is the elastic isochoric PK2 stress; with `moduli` it is instead 2 dpsi/dCbar before the isochoric projection,
+    which is applied afterwards: then it is the moduli that relax, from the first sample on, and no stress is left
+    when the specimen is back at its first length. Tissue is seen to follow either. The energy's moduli are
+    INSTANTANEOUS ones; the long-term stress is (1 - sum_i g_i) of it (`long_term`). A recording starts from rested
+    tissue. `terms` relaxation times lie, to start with, in equal parts of the decades from `shortest` to `longest`
+    seconds.
 
     Revealed by force falling during holds, by hysteresis between loading and unloading, by stiffness rising with rate.
     Blind: one monotonic ramp at constant rate (it looks like another energy). Inseparable from softening in a single
@@ -38,6 +41,7 @@ class Viscoelasticity(Effect):
     terms: int = 2
     shortest: float = 0.1
     longest: float = 100.0
+    moduli: bool = False
 
     @property
     def amplitudes(self) -> tuple[str, ...]:
@@ -74,11 +78,20 @@ class Viscoelasticity(Effect):
         return 1 - sum(p[f"g{i}"] for i in self._numbers)
 
     def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:
+        inverse = state.inverse
         s = state.stacked()
+        if self.moduli:
+            s = s + state.spherical[:, None] * inverse
         g = jnp.stack([jnp.asarray(p[f"g{i}"]) for i in self._numbers])
         tau = jnp.stack([jnp.asarray(p[f"tau{i}"]) for i in self._numbers])
         h = jax.vmap(lambda t: fading(test.time, s, t))(tau)
-        return state.replaced(s - jnp.tensordot(g, s - h, 1))
+        if not self.moduli:
+            return state.replaced(s - jnp.tensordot(g, s - h, 1))
+        h = h + jnp.exp(-test.elapsed[:, None] / tau[:, None, None]) * s[0]  # moduli are there before any strain
+        lost = jnp.tensordot(g, s - h, 1)
+        C = jnp.stack([state.C.xx, state.C.yy, state.C.zz, 2 * state.C.xy], -1)
+        lost = lost - jnp.sum(lost * C, -1, keepdims=True) / 3 * inverse
+        return state.replaced(state.stacked() - lost)
 
     def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
         g = jnp.stack([jnp.asarray(p[f"g{i}"]) for i in self._numbers])

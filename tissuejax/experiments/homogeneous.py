@@ -28,7 +28,7 @@ from tissuejax.experiments.kinematics import Gradient, deformation, hydrostatic,
 from tissuejax.model import Model
 from tissuejax.parameters import under
 from tissuejax.recordings.recording import Channel, Recording
-from tissuejax.tensors import Sym
+from tissuejax.tensors import Sym, determinant
 
 Values = Mapping[str, Array]
 
@@ -180,17 +180,24 @@ def specimen_stress(
 def elastic(model: Model, values: Values, test: MaterialTest, C: Sym) -> Stress:
     """Elastic isochoric PK2 stress 2 dpsi/dC in the test's axes, psi being the base energy plus what effects add."""
 
-    def total(C: Sym) -> tuple[Array, Array]:
-        strain = Strain.of(C)
-        turned = strain if model.isotropic else Strain.of(in_sample(C, test.frame))
+    def density(C: Sym, J: Array) -> Array:
+        strain = Strain(C, J)
+        turned = strain if model.isotropic else Strain(in_sample(C, test.frame), J)
         psi = model.energy.isochoric(under("energy", values), strain if model.energy.isotropic else turned)
         for effect in model.ordered:
             psi = psi + effect.energy(under(f"effects.{effect.name}", values), strain if effect.isotropic else turned)
+        return psi
+
+    def total(C: Sym) -> tuple[Array, Array]:
+        psi = density(C, jnp.sqrt(determinant(C)))
         return jnp.sum(psi), psi
 
     # An off-diagonal component stands for two entries of C, so its derivative is doubled already.
     (_, psi), g = jax.value_and_grad(total, has_aux=True)(C)
-    return Stress(Sym(2 * g.xx, 2 * g.yy, 2 * g.zz, g.xy, g.xz, g.yz), psi, C)
+    J = jnp.sqrt(determinant(C))
+    # Growing C with J held sees what the projection removes: d psi / dk at k C is (2 dpsi/dCbar) : C / 2.
+    _, growth = jax.jvp(lambda k: density(Sym(*(k * c for c in C)), J), (jnp.ones_like(J),), (jnp.ones_like(J),))
+    return Stress(Sym(2 * g.xx, 2 * g.yy, 2 * g.zz, g.xy, g.xz, g.yz), psi, C, 2 * growth / 3)
 
 
 def _swollen(
