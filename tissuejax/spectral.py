@@ -6,8 +6,8 @@ differences of eigenvalues, which vanish at rest and all along a uniaxial test. 
 - d tr f(C) = f'(C) : dC, with no difference of eigenvalues at all;
 - d f(C) = Q (f[l_i, l_j] o Q^T dC Q) Q^T (Daleckii and Krein; Higham 2008, theorem 3.11), with the divided
   difference f[x, y] of a power written in expm1, so that it is exact at x = y and free of cancellation nearby;
-- d2 f(C) by second divided differences f[x, y, z], from their integral where the three are close (third derivatives
-  of an energy; a fourth is refused).
+- d2 f(C) by second divided differences f[x, y, z], from their integral where the three are close: third derivatives
+  of an energy, forward throughout or with reverse outermost (other orders, and a fourth, are refused).
 
 All functions have the form f(x) = x^s ln(x)^m, as differentiating in s raises m by one; so exponents may be traced.
 Eigenvalues come from a fixed number of branch-free cyclic Jacobi rotations on components (Golub and Van Loan
@@ -221,7 +221,12 @@ def _rotation(A: Sym, v: tuple[Vector, ...]) -> tuple[Sym, tuple[Vector, ...]]:
 
 @_eigensystem.defjvp
 def _eigensystem_jvp(primals, tangents):
-    raise NotImplementedError("a fourth derivative of a spectral energy in C: derivatives are exact to the third only")
+    # Only reached where a linear part was separated from its rule: by a fourth derivative, or forward over reverse over
+    # another. A formula in 1 / (l_i - l_j) would answer, wrongly at equal stretches.
+    raise NotImplementedError(
+        "no such derivative of an energy in principal stretches: the first two in C come in any order, a third "
+        "only with reverse mode outermost or forward mode throughout, a fourth not at all"
+    )
 
 
 def _tangent(d: Sym) -> tuple[Sym, bool]:

@@ -43,7 +43,7 @@ def energy(name: str, ogden_form: str | None = None) -> Energy:
     if plus and f"+{addition}" not in additions:
         raise unknown("addition to an energy", f"+{addition}", additions)
     stem = ALIASES.get(stem, stem)
-    takes_form = stem.rpartition("-")[0] == "ogden"
+    takes_form = stem == "ogden" or stem.startswith("ogden-")
     if ogden_form is not None and not takes_form:
         raise InputError(f"energy {name!r} takes no Ogden form ({ogden_form!r} came): leave it out, or write ogden-N")
     if takes_form:

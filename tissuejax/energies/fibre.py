@@ -18,7 +18,7 @@ class WithFibre(Energy):
     """psi = matrix + k1/(2 k2) (exp(k2 <E>^2) - 1), E = kappa (I1bar - 3) + (1 - 3 kappa) (I4bar - 1).
 
     I4bar is the squared isochoric stretch along (cos angle, sin angle, 0); kappa is the dispersion, 0 aligned, 1/3
-    isotropic. <E> is 0 for E < 0, E for E > 1e-3 and a cubic between, so that fibres carry tension only and yet the
+    isotropic. <E> is 0 for E < 0, E for E > 1e-3 and a quartic between, so that fibres carry tension only and yet the
     stress is continuously differentiable. They add nothing to the shear modulus at rest.
     Source: Gasser, Ogden and Holzapfel 2006, J. R. Soc. Interface 3, eq. 3.5.
     """
@@ -55,6 +55,6 @@ class WithFibre(Energy):
 
 
 def _positive(E: Float[Array, "..."]) -> Float[Array, "..."]:
-    """0 below 0, E above ONSET, the cubic that joins them with equal slopes between."""
-    onset = E * E * (2 * ONSET - E) / ONSET**2
+    """0 below 0, E above ONSET; between, a quartic that meets E twice smoothly and keeps W'' positive."""
+    onset = E * (1 - (1 - E / ONSET) ** 3)
     return jnp.where(E >= ONSET, E, jnp.where(E > 0, onset, 0.0))

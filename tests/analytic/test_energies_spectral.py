@@ -1,0 +1,92 @@
+"""Powers of tensors against matrix products and numpy's eigensolver, derivatives to the third at equal eigenvalues."""
+
+import functools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from tissuejax import spectral
+from tissuejax.tensors import Sym
+
+quick = functools.partial(jax.jit, compiler_options={"xla_backend_optimization_level": "0"})  # compiled for one use
+POINTS = {
+    "rest": [1.0, 1.0, 1.0, 0.0, 0.0, 0.0],
+    "two equal": [1.3, 0.8, 0.8, 0.0, 0.0, 0.0],
+    "two nearly equal": [1.2, 0.9000001, 0.9, 1e-9, 0.0, 0.0],
+    "full": [1.2, 0.9, 1.1, 0.2, -0.1, 0.3],
+    "wide": [1.0, 2.0, 5.0, 0.2, 0.3, 0.1],
+}
+
+
+def matrix(v):
+    return Sym(*v).matrix()
+
+
+# Traces whose every derivative comes from products of matrices, no eigenvalue in sight.
+REFERENCE = {
+    6.0: lambda v: jnp.trace(matrix(v) @ matrix(v) @ matrix(v)),
+    -2.0: lambda v: jnp.trace(jnp.linalg.inv(matrix(v))),
+}
+
+
+@pytest.mark.parametrize("alpha", REFERENCE)
+@pytest.mark.parametrize("point", POINTS)
+def test_three_derivatives_are_exact(point, alpha):
+    v = jnp.array(POINTS[point])
+    one, other = lambda v: spectral.power_sums(Sym(*v), (alpha,))[0], REFERENCE[alpha]
+    for derivative in (jax.jacrev, jax.jacfwd, jax.jacrev):
+        one, other = derivative(one), jax.jacfwd(other)
+        a, b = quick(one)(v), quick(other)(v)
+        np.testing.assert_allclose(a, b, atol=2e-12 * float(jnp.max(jnp.abs(b))))
+
+
+def test_three_forward_derivatives_too():
+    f = lambda l: spectral.power_sums(Sym(l, 1.0, 1.0, 0.0, 0.0, 0.0), (5.0,))[0]  # noqa: E731
+    for _ in range(3):
+        f = jax.jacfwd(f)
+    assert quick(f)(1.0) == pytest.approx(2.5 * 1.5 * 0.5)
+
+
+def test_derivatives_in_a_traced_exponent_mix_with_those_in_the_tensor():
+    # tr C^s at distinct eigenvalues: d/ds = sum x^s ln x, then in C = diag: d/dx = s x^(s-1) ln x + x^(s-1).
+    x, alpha = jnp.array([1.7, 1.0, 0.6]), 2.6
+    f = lambda a, x: spectral.power_sums(Sym(*x, 0.0, 0.0, 0.0), (a,))[0]  # noqa: E731
+    s = alpha / 2
+    want = 0.5 * (s * x ** (s - 1) * jnp.log(x) + x ** (s - 1))
+    np.testing.assert_allclose(jax.jacfwd(jax.grad(f, 0), 1)(alpha, x), want, rtol=1e-13)
+    np.testing.assert_allclose(jax.jacfwd(jax.grad(f, 1), 0)(alpha, x), want, rtol=1e-13)
+    second = jax.grad(jax.grad(f))(alpha, x)
+    np.testing.assert_allclose(second, 0.25 * jnp.sum(x**s * jnp.log(x) ** 2), rtol=1e-13)
+
+
+def test_a_fourth_derivative_is_refused_not_wrong():
+    f = lambda x: spectral.power_sums(Sym(x, 1.0, 1.0, 0.0, 0.0, 0.0), (3.0,))[0]  # noqa: E731
+    for _ in range(4):
+        f = jax.jacfwd(f)
+    with pytest.raises(NotImplementedError, match="a fourth not at all"):
+        jax.eval_shape(f, 1.1)
+
+
+@pytest.mark.parametrize(("kind", "tolerance"), [(jnp.float64, 5e-15), (jnp.float32, 2e-6)])
+def test_eigensystem_agrees_with_numpy_over_many_tensors(rng, kind, tolerance):
+    # Small strains, large ones, and ratios of stretch to 30, with degenerate and diagonal ones among them.
+    F = np.concatenate([np.eye(3) + scale * rng.normal(size=(3000, 3, 3)) for scale in (1e-6, 0.1, 1.0)])
+    C = np.swapaxes(F, 1, 2) @ F
+    C = np.concatenate([C[np.linalg.eigvalsh(C)[:, 0] > 1e-3], np.eye(3)[None], np.diag([2.0, 1.0, 1.0])[None]])
+    values, vectors = spectral.eigensystem(Sym.from_matrix(jnp.asarray(C, kind)))
+    want = np.linalg.eigvalsh(C)
+    got = np.sort(np.stack(values, -1), -1)
+    assert got.dtype == kind
+    assert np.max(np.abs(got - want) / want[:, 2:]) < tolerance
+    Q = np.stack([np.stack(v, -1) for v in vectors], -1)
+    rebuilt = Q * np.stack(values, -1)[:, None, :] @ np.swapaxes(Q, 1, 2)
+    assert np.max(np.abs(rebuilt - C) / want[:, 2:, None]) < 2 * tolerance
+
+
+def test_powers_of_a_tensor():
+    C = Sym(*POINTS["full"])
+    root, inverse = spectral.powers(C, (0.5, -1))
+    np.testing.assert_allclose(root.matrix() @ root.matrix(), C.matrix(), atol=1e-14)
+    np.testing.assert_allclose(inverse.matrix() @ C.matrix(), np.eye(3), atol=1e-14)
