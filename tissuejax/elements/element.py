@@ -57,8 +57,8 @@ class Element(eqx.Module):
     def steepness(self, reference: Any, hourglass: float) -> Float[Array, " E"]:
         """Largest eigenvalue of sum_a B_a B_a^T times the number of nodes, 1/m^2, or that of the hourglass modes.
 
-        With wave speed c the highest frequency of an element obeys omega^2 <= c^2 * steepness. `hourglass`: stiffness
-        of the hourglass control over that of the waves (rho c^2).
+        With wave speed c the highest frequency of a mesh of such elements is about c sqrt(steepness): 2 c/L for cubes
+        of side L. `hourglass`: stiffness of the hourglass control over that of the waves (rho c^2).
         """
 
 

@@ -1,0 +1,91 @@
+"""Every element: shape functions, gradients of linear fields, forces without resultant, volume, faces, steepness."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from tissuejax import elements
+from tissuejax.elements.element import Element
+from tissuejax.families import members
+from tissuejax.mesh.facets import FACES
+
+ELEMENTS = members(elements, Element)
+
+
+@pytest.fixture(params=sorted(ELEMENTS))
+def element(request):
+    return ELEMENTS[request.param]()
+
+
+@pytest.fixture
+def bent(element, rng):
+    """Three elements of that kind, bent out of shape: node positions (3, k, 3)."""
+    corners = element.corners.T[:, :, None]
+    return jnp.asarray(0.01 * (corners + 0.15 * rng.normal(size=(*corners.shape[:2], 3))))
+
+
+def test_shape_functions_are_one_at_home_zero_elsewhere_and_sum_to_one(element, rng):
+    assert np.allclose(element.shape(jnp.asarray(element.corners)), np.eye(element.nodes))
+    assert np.allclose(element.shape(jnp.asarray(rng.uniform(size=(5, 3)))).sum(1), 1)
+
+
+def test_a_linear_displacement_gives_its_own_gradient_and_no_hourglass(element, bent, rng):
+    H = rng.normal(size=(3, 3))
+    u = jnp.einsum("ij,jke->ike", H, bent) + rng.normal(size=(3, 1, 1))
+    F, memory = element.gradient(element.reference(bent), u)
+    assert np.allclose(np.array(F).reshape(3, 3, -1), (np.eye(3) + H)[:, :, None], atol=1e-12)
+    assert all(np.allclose(q, 0, atol=1e-12) for q in memory)
+
+
+def test_forces_are_the_transpose_of_the_gradient_and_hourglass_energy_is_not_negative(element, bent, rng):
+    """The power of the nodal forces equals V P : Fdot for a velocity without hourglass part."""
+    reference = element.reference(bent)
+    H, P = rng.normal(size=(2, 3, 3, 1))
+    v = jnp.einsum("ij,jke->ike", H[..., 0], bent)
+    _, memory = element.gradient(reference, jnp.zeros_like(bent))
+    f = element.forces(reference, tuple(jnp.broadcast_to(p, (3,)) for p in P.reshape(9, 1)), memory, jnp.ones(3))
+    assert np.allclose(jnp.sum(f * v, (0, 1)), reference.volume * np.sum(P * H), rtol=1e-10)
+    w = jnp.asarray(rng.normal(size=bent.shape))
+    _, memory = element.gradient(reference, w)
+    f = element.forces(reference, (jnp.zeros(3),) * 9, memory, jnp.ones(3))
+    assert (jnp.sum(f * w, (0, 1)) >= -1e-15).all()
+
+
+def test_forces_have_no_resultant_and_no_moment_about_any_point(element, bent, rng):
+    """Force balance for any stress; moment balance x cross f for a symmetric Cauchy stress (here F = 1)."""
+    reference = element.reference(bent)
+    _, memory = element.gradient(reference, 1e-4 * jnp.asarray(rng.normal(size=bent.shape)))
+    S = rng.normal(size=(3, 3))
+    P = tuple(jnp.full(3, s) for s in (S + S.T).ravel())
+    f = element.forces(reference, P, memory, jnp.ones(3))
+    assert np.allclose(f.sum(1), 0, atol=1e-12)
+    moment = np.cross(np.asarray(bent), np.asarray(f), axis=0).sum(1)
+    assert np.allclose(moment, 0, atol=1e-12)
+
+
+def test_volume_is_that_of_a_parallelepiped(element, rng):
+    A = np.eye(3) + 0.2 * rng.normal(size=(3, 3))
+    x = jnp.asarray(A @ element.corners.T)[:, :, None]
+    unit = 8.0 if element.nodes == 8 else 1 / 6
+    assert np.allclose(element.reference(x).volume, unit * np.linalg.det(A))
+
+
+def test_faces_look_outwards_and_agree_with_the_mesh_room(element):
+    assert element.faces == FACES[element.name]
+    centre = element.corners.mean(0)
+    for face in element.faces:
+        x = element.corners[list(face)]
+        assert np.cross(x[1] - x[0], x[2] - x[0]) @ (x.mean(0) - centre) > 0
+
+
+def test_steepness_is_the_largest_eigenvalue_of_the_gradients_and_grows_with_the_hourglass_stiffness(element, bent):
+    """nodes * sum_a B_a B_a^T with V B_a read off from the forces of unit stresses."""
+    reference = element.reference(bent)
+    _, memory = element.gradient(reference, jnp.zeros_like(bent))
+    B = []
+    for J in range(3):
+        P = tuple(jnp.full(3, float(k == J)) for k in range(9))  # row x of P
+        B.append(element.forces(reference, P, memory, jnp.ones(3))[0] / reference.volume)
+    G = element.nodes * np.einsum("Ike,Jke->eIJ", B, B)
+    assert np.allclose(element.steepness(reference, 0.0), np.linalg.eigvalsh(G)[:, -1])
+    assert (element.steepness(reference, 5.0) >= element.steepness(reference, 0.0)).all()

@@ -1,0 +1,189 @@
+"""Static equilibrium by dynamic relaxation, with the implicit derivative.
+
+The explicit machinery is run with fictitious masses, for which every element's critical step is about one, and with the
+damping that is critical for the slowest mode, estimated as it goes by a Rayleigh quotient (Underwood 1983; Joldes,
+Wittek & Miller 2009). The derivative does not go through the iterations: at the solution the tangent stiffness is solved
+by conjugate gradients, K du = -dr, forwards or in reverse, for any number of parameters. float32 stalls at a relative
+residual of about 1e-4; statics wants float64.
+"""
+
+from functools import partial
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int
+
+from tissuejax.errors import NotConverged
+from tissuejax.tled import capsule, contact, internal, stable, support
+from tissuejax.tled.scene import Scene
+from tissuejax.tled.simulate import COMPILER_OPTIONS, series
+
+MARGIN = 1.6  # fictitious mass over the estimate: large strains stiffen
+CHECK = 25  # iterations between two looks at the residual
+
+
+class Equilibrium(eqx.Module):
+    """A static solution.
+
+    Attributes:
+        displacement: (N, 3), m, NaN where the search ended without an answer.
+        residual: greatest unbalanced force over the greatest force present.
+        iterations: of dynamic relaxation.
+        force: of the tissue on the probe, N (zero without one).
+    """
+
+    displacement: Float[Array, "N 3"]
+    residual: Float[Array, ""]
+    iterations: Int[Array, ""]
+    force: Float[Array, " 3"]
+
+
+class Load(NamedTuple):
+    """The reference quantities of a static problem, worked out once."""
+
+    scene: Scene
+    mesh: internal.Mesh
+    skin: capsule.Skin | None
+    patch: contact.Patch | None
+    centre: Float[Array, " 3"] | None
+    held: Array
+    target: Float[Array, "3 N"]
+    diagonal: Float[Array, " N"]
+
+
+def load(scene: Scene, time: float = 0.0) -> Load:
+    """Reference quantities for the loads at real time `time`: probe and support where they are then."""
+    mesh = internal.mesh(scene)
+    hold = support.hold(scene.put({"support.compliance": None, "support.fluidity": None}), None)
+    motion, patch, centre = None, None, None
+    if scene.support.displacement is not None:
+        motion = series(scene.support.time, scene.support.displacement, jnp.asarray([time]))[0]
+    diagonal = stable.nodal_stiffness(scene, mesh)
+    if scene.probe is not None:
+        probe = scene.probe
+        scene = scene.put({"probe.friction": None, "probe.adhesion": None})
+        centre = series(probe.time, probe.position, jnp.asarray([time]))[0]
+        centre = centre if probe.offset is None else centre + probe.offset
+        patch = contact.patch(scene)
+        diagonal = diagonal + 4 * probe.mass / scene.clock.step**2  # the static mass is penalty * area * h^2 / 4
+    if scene.tissue.capsule is not None:
+        diagonal = diagonal.at[scene.body.facets].add(4 * scene.tissue.capsule)
+    skin = None if scene.tissue.capsule is None else capsule.skin(scene.body)
+    target = support.target(scene, hold, support.Slip(None, None), motion)
+    return Load(scene, mesh, skin, patch, centre, hold.held, target, diagonal)
+
+
+def long_term(scene: Scene, mesh: internal.Mesh) -> internal.History:
+    """An empty memory; with an infinite step every relaxation then ends at once."""
+    tissue, zero = scene.tissue, jnp.zeros_like(mesh.stiffness)
+    relaxed = None if tissue.prony is None else [(zero,) * 6 for _ in range(len(tissue.prony.g))]
+    return internal.History(relaxed, None if tissue.damage is None else zero)
+
+
+def pull(at: Load, u: Float[Array, "3 N"]) -> tuple[Float[Array, "3 N"], Float[Array, "3 N"]]:
+    """Internal and external forces at displacement u, N."""
+    scene = at.scene
+    inner, _ = internal.forces(scene, at.mesh, u, long_term(scene, at.mesh), jnp.inf)
+    if at.skin is not None:
+        inner = inner + capsule.forces(at.skin, scene.tissue.capsule, u)
+    outer = jnp.zeros_like(u) if scene.gravity is None else scene.gravity[:, None] * at.mesh.mass
+    if at.patch is not None:
+        outer = outer + contact.forces(scene.probe, at.patch, u, at.centre, contact.untouched(scene.probe)).nodal
+    return inner, outer
+
+
+def unbalanced(at: Load, w: Float[Array, "3 N"]) -> Float[Array, "3 N"]:
+    """Residual in the unknowns w: internal minus external force where free, w itself where held."""
+    inner, outer = pull(at, jnp.where(at.held, at.target, w))
+    return jnp.where(at.held, w, inner - outer)
+
+
+def relax(at: Load, start: Float[Array, "3 N"], tolerance: float, most: int):
+    """Dynamic relaxation from `start`; (w, (relative residual, iterations))."""
+    mass = 0.25 * MARGIN * at.diagonal
+    free = ~at.held
+
+    def one(_, state):
+        u, v, r_old, omega2 = state
+        inner, outer = pull(at, jnp.where(at.held, at.target, u))
+        r = jnp.where(free, inner - outer, 0.0)
+        moved = jnp.vdot(v, mass * v)
+        guess = jnp.vdot(v, r - r_old) / jnp.where(moved > 0, moved, 1.0)
+        omega2 = jnp.where((moved > 0) & (guess > 0), jnp.clip(guess, 1e-8, 1.0), omega2)
+        c = 2 * jnp.sqrt(omega2)
+        v = ((2 - c) * v - 2 * r / mass) / (2 + c)
+        return u + v, v, r, omega2
+
+    def many(carry):
+        state, count, _ = carry
+        state = jax.lax.fori_loop(0, CHECK, one, state)
+        inner, outer = pull(at, jnp.where(at.held, at.target, state[0]))
+        worst = jnp.max(jnp.abs(jnp.where(free, inner - outer, 0.0)))
+        scale = jnp.maximum(jnp.max(jnp.abs(inner)), jnp.max(jnp.abs(outer)))
+        return state, count + CHECK, worst / jnp.where(scale > 0, scale, 1.0)
+
+    def going(carry):
+        return (carry[2] > tolerance) & (carry[1] < most)
+
+    zero = jnp.zeros_like(start)
+    state = (jnp.where(at.held, 0.0, start), zero, zero, jnp.asarray(1e-4, start.dtype))
+    state, count, residual = jax.lax.while_loop(going, many, (state, jnp.asarray(0), jnp.asarray(jnp.inf, start.dtype)))
+    return jnp.where(at.held, 0.0, state[0]), (residual, count.astype(start.dtype))  # custom_root: float aux
+
+
+def tangent_solve(at: Load, apply, b: Float[Array, "3 N"], symmetric: bool = True) -> Float[Array, "3 N"]:
+    """Solve with the tangent by preconditioned conjugate gradients (or BiCGStab where it is not symmetric)."""
+    diagonal = jnp.where(at.held, 1.0, at.diagonal)
+    method = jax.scipy.sparse.linalg.cg if symmetric else jax.scipy.sparse.linalg.bicgstab
+
+    def solve(matvec, b):
+        return method(matvec, b, tol=1e-11, maxiter=4000, M=lambda x: x / diagonal)[0]
+
+    return jax.lax.custom_linear_solve(apply, b, solve, solve, symmetric=symmetric)
+
+
+def equilibrium(scene: Scene, time: float = 0.0, tolerance: float = 1e-9, most: int = 20_000) -> Equilibrium:
+    """Static equilibrium of a scene under the loads at `time`. Pure JAX, differentiable both ways.
+
+    Args:
+        scene: gravity, probe, support motion, capsule, stiffness field, added energies and long-term Prony stress
+            act; friction, adhesion and bedding do not. Start is `body.settled`, or rest.
+        time: real time at which probe and support are looked up, s.
+        tolerance: on the greatest unbalanced force over the greatest force.
+        most: iterations after which it is given up (the displacement is NaN then; `checked` says so).
+    """
+    scene = scene.cast(scene.body.points.dtype)
+    at = load(scene, time)
+    first = jax.lax.stop_gradient(internal.settled(scene))
+    w, (residual, count) = jax.lax.custom_root(
+        partial(unbalanced, at),
+        first,
+        lambda _, start: relax(jax.lax.stop_gradient(at), start, tolerance, most),
+        lambda apply, b: tangent_solve(jax.lax.stop_gradient(at), apply, b),
+        has_aux=True,
+    )
+    u = jnp.where(at.held, at.target, w)
+    u = jnp.where(residual <= tolerance, u, jnp.nan)
+    force = jnp.zeros(3, u.dtype)
+    if at.patch is not None:
+        force = contact.forces(at.scene.probe, at.patch, u, at.centre, contact.untouched(at.scene.probe)).force
+    return Equilibrium(u.T, residual, count.astype(int), force)
+
+
+compiled = jax.jit(equilibrium, compiler_options=COMPILER_OPTIONS, static_argnames=("most",))
+
+
+def checked(found: Equilibrium) -> Equilibrium:
+    """`found`, or the sentence that says why not.
+
+    Raises:
+        NotConverged: the residual did not fall below the tolerance.
+    """
+    if not bool(jnp.isfinite(found.displacement).all()):
+        raise NotConverged(
+            f"no static equilibrium after {int(found.iterations)} iterations: unbalanced force "
+            f"{float(found.residual):.1e} of the greatest; check loads and support, use double precision, or allow more"
+        )
+    return found
