@@ -48,7 +48,7 @@ class Probing(Experiment):
 class Added(eqx.Module):
     """The strain energy of an effect, as the simulation wants it: a function of strain with its values inside."""
 
-    effect: Effect
+    effect: Effect = eqx.field(static=True)
     values: Mapping[str, Array]
 
     def __call__(self, strain: Strain) -> Float[Array, "..."]:
@@ -84,7 +84,7 @@ def assembled(model: Model, values: Mapping[str, Array], setup: Setup) -> tuple[
     energy, bulk = under("energy", values), under("volumetric", values)
     scene = setup.scene
     dtype = scene.body.points.dtype
-    shear = jax.lax.stop_gradient(model.energy.initial_shear_modulus(energy))
+    shear = model.energy.initial_shear_modulus(energy)
     changes = {
         "tissue.energy_values": {k: jnp.asarray(v, dtype) for k, v in energy.items()},
         "settings.mass_damping": setup.damping * jnp.sqrt(jnp.maximum(shear, 1e-9)),
@@ -104,12 +104,14 @@ def assembled(model: Model, values: Mapping[str, Array], setup: Setup) -> tuple[
 
 
 def _ballast(scene: Scene) -> Float[Array, " N"]:
-    """Mass that lengthens the critical step of each element to the step of the clock, kg; no derivative is due.
+    """Mass that lengthens the critical step of each element to the step of the clock, kg.
 
     An element's critical step grows with the root of its mass. Probing is slow, so some mass in a few small or stiff
     elements is harmless, and the step count stays fixed whatever values a fit visits.
     """
-    frozen = jax.lax.stop_gradient(scene)
+    frozen = scene.put(
+        {"body.points": jax.lax.stop_gradient(scene.body.points)}
+    )  # eigenvalues of cubes have no derivative
     mesh = reference(frozen)
     beta, h = frozen.settings.stiffness_damping, frozen.clock.step
     critical = critical_steps(frozen.put({"settings.stiffness_damping": jnp.zeros_like(beta)}), mesh)

@@ -22,7 +22,7 @@ from tissuejax.experiments.homogeneous import local
 from tissuejax.experiments.predictor import Predictor, Tangents
 from tissuejax.experiments.probing import Simulated, simulated
 from tissuejax.experiments.probing_settings import ProbingSettings
-from tissuejax.experiments.probing_setup import Setup, setups
+from tissuejax.experiments.probing_setup import Setup, retimed, setups
 from tissuejax.model import Model
 from tissuejax.parameters import Values
 from tissuejax.recordings.recording import Channel, Recording, Sample
@@ -58,6 +58,9 @@ class ProbingPredictor(Predictor):
 
     def with_settings(self, settings: ProbingSettings) -> "ProbingPredictor":
         """The same recordings simulated otherwise."""
+        if settings == self.settings.changed(compression=settings.compression):  # another speed needs no other mesh
+            scenes = {name: retimed(setup, settings) for name, setup in self.setups.items()}
+            return ProbingPredictor(self.model, self.sample, self.names, settings, scenes)
         return self.prepare(self.model, self.sample, self.names, settings)
 
     def with_model(self, model: Model) -> "ProbingPredictor":
@@ -119,7 +122,7 @@ class ProbingPredictor(Predictor):
         """Run the jobs on as many threads as the settings say; in order and alone where values are traced."""
         if any(isinstance(t, jax.core.Tracer) for t in thetas.values()):
             return [job() for job in jobs]
-        if self.settings.threads == 1 or len(jobs) == 1:
+        if self.settings.threads == 1 or len(jobs) == 1 or not programs.PARALLEL:
             return [jax.device_get(job()) for job in jobs]
         with ThreadPoolExecutor(self.settings.threads) as pool:
             return list(pool.map(lambda job: jax.device_get(job()), jobs))

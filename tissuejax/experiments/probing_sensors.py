@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 from scipy.ndimage import gaussian_filter1d
+from scipy.spatial import cKDTree
 
 from tissuejax.errors import InputError
 from tissuejax.mesh.facets import Facets, triangles
@@ -39,10 +40,7 @@ def surface_gap(
     corners = np.asarray(points)[triangles(facets.nodes)]
     bary = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4
     dots = np.einsum("qc,fcd->fqd", bary, corners).reshape(-1, 3)
-    out = np.empty(len(path))
-    for i in range(0, len(path), 200):
-        out[i : i + 200] = np.linalg.norm(path[i : i + 200, None] - dots[None], axis=2).min(1) - radius
-    return out
+    return cKDTree(dots).query(path)[0] - radius
 
 
 class Contact(NamedTuple):

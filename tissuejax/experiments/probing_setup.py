@@ -92,6 +92,16 @@ def setups(model: Model, sample: Sample, names: Sequence[str], settings: Probing
     return out
 
 
+def retimed(setup: Setup, settings: ProbingSettings) -> Setup:
+    """The same setup at another compression; the time step stays, so that masses and penalty stay."""
+    clock = setup.scene.clock
+    steps = settings.changed(interval=float(clock.interval)).steps
+    faster = Clock(
+        clock.start, clock.interval, jnp.asarray(settings.compression, clock.interval.dtype), clock.frames, steps
+    )
+    return eqx.tree_at(lambda s: s.scene.clock, setup, faster)
+
+
 def _radius(recording: Recording) -> float:
     if "probe/radius" not in recording.attributes:
         raise InputError(f"recording {recording.name}: no probe/radius; give the radius of the tip in metres")

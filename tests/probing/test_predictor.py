@@ -1,0 +1,200 @@
+"""The prediction of probings: neutral effects, derivatives, invariances, rest of markers, refusals."""
+
+from dataclasses import replace
+
+import jax
+import numpy as np
+import pytest
+
+from tests.probing.bench import BODY, MARKERS, QUICK, VALUES, model, recording, sample
+from tissuejax.effects.catalogue import effects, suited
+from tissuejax.errors import InputError, UnstableSimulation
+from tissuejax.experiments import programs
+from tissuejax.experiments.predictor import predictor
+from tissuejax.experiments.probing import assembled
+from tissuejax.experiments.probing_predictor import ProbingPredictor, _linearised, _vector
+from tissuejax.experiments.probing_sensors import rest_positions
+from tissuejax.experiments.probing_settings import ProbingSettings
+from tissuejax.recordings.recording import Channel
+
+PRECISE = replace(QUICK, precision="float64")
+HAS_SHAPE_OF_ITS_OWN = {"gravity"}  # solves for another reference shape: equal to rounding, not to the last bit
+
+
+def every_effect(*names):
+    return [suited(n, "probing") for n in effects("probing") if (not names or n in names)]
+
+
+@pytest.fixture(scope="module")
+def base() -> ProbingPredictor:
+    return predictor(model(), sample(), settings=QUICK)
+
+
+@pytest.fixture(scope="module")
+def plain(base):
+    return base.predict(VALUES)["r1"]
+
+
+def test_a_press_is_felt_as_it_should(plain):
+    force, time = plain.channels["force"].values, plain.channels["force"].time
+    assert np.abs(force[time < 0.25]).max() < 1e-4  # nothing before touch
+    assert force[:, 2].min() > -1e-3  # no pull without adhesion
+    deep = force[(time > 1.0) & (time < 1.6), 2]
+    assert 0.05 < deep.mean() < 0.5
+    assert deep.std() < 0.03 * deep.mean()  # an elastic body holds its force
+    assert np.abs(force[time > 2.3]).max() < 2e-3
+    markers = plain.channels["markers"].values
+    assert np.abs(markers[:2] - MARKERS).max() < 1e-5  # rest where they were measured
+    assert 1e-5 < np.abs(markers[20] - MARKERS).max() < 1e-3
+
+
+def test_effects_at_neutral_leave_the_scene_as_it_is(base):
+    setup = base.setups["r1"]
+    plain, _ = assembled(model(), VALUES, setup)
+    for effect in every_effect():
+        if effect.name in HAS_SHAPE_OF_ITS_OWN:
+            continue
+        one = model(effect)
+        values = one.defaults | VALUES | {f"effects.{effect.name}.{k}": v for k, v in effect.neutral.items()}
+        scene, _ = assembled(one, values, setup)
+        for part in ("body.points", "probe.time", "probe.position", "probe.mass", "probe.shape.radius"):
+            a, b = scene, plain
+            for key in part.split("."):
+                a, b = getattr(a, key), getattr(b, key)
+            assert np.array_equal(a, b), (effect.name, part)
+        assert np.array_equal(scene.stiffness, plain.stiffness), effect.name
+        shown = {"force": Channel(np.arange(4.0), np.random.default_rng(0).normal(size=(4, 3)), "N")}
+        shown["markers"] = Channel(np.arange(4.0), MARKERS + np.zeros((4, 1, 1)), "m")
+        p = {k: np.asarray(v) for k, v in effect.neutral.items()}
+        for name, channel in effect.channels(p, setup.test, shown).items():
+            assert np.array_equal(channel.values, shown[name].values), effect.name
+            assert np.array_equal(channel.time, shown[name].time), effect.name
+
+
+def test_all_effects_at_neutral_reproduce_the_prediction(base, plain):
+    chosen = [e for e in every_effect() if e.name not in HAS_SHAPE_OF_ITS_OWN]
+    nested = base.with_model(model(*chosen))
+    out = nested.predict(nested.model.defaults | VALUES)["r1"]
+    for name, channel in plain.channels.items():
+        size = np.abs(np.asarray(channel.values)).max()
+        assert np.abs(out.channels[name].values - channel.values).max() < 2e-5 * size, name
+
+
+def test_derivatives_equal_difference_quotients():
+    """Along one direction through base, contact, memory, support, inclusion and sensors at once, in float64."""
+    names = (
+        "friction",
+        "viscoelasticity",
+        "periodic",
+        "inclusion",
+        "contact-offset",
+        "registration",
+        "clock-lag",
+        "drift",
+    )
+    p = predictor(model(*every_effect(*names)), sample(), settings=PRECISE)
+    values = p.model.defaults | VALUES
+    values |= {
+        "effects.friction.coefficient": 0.2,
+        "effects.viscoelasticity.g1": 0.2,
+        "effects.inclusion.contrast": 0.5,
+    }
+    values |= {"effects.periodic.sin.r1": 3e-4, "effects.clock-lag.lag": 0.02, "effects.registration.turn": 0.1}
+    bare = p.model.across(())
+    from tissuejax.experiments.homogeneous import local
+
+    known = local(p.model, values, "r1")
+    theta = _vector(known)
+    scale = np.array([bare.declared[path].typical for path in known])
+    direction = np.random.default_rng(1).normal(size=len(theta)) * scale
+    h = 1e-6
+
+    def run(x):
+        return programs.run(_linearised, bare, x, p.setups["r1"], direction[None])
+
+    _, slopes = run(theta)
+    (up, _), (down, _) = run(theta + h * direction), run(theta - h * direction)
+    for name in ("force", "markers"):
+        quotient = (np.asarray(up.channels[name]) - np.asarray(down.channels[name])) / (2 * h)
+        error = np.linalg.norm(quotient - np.asarray(slopes[name][0])) / np.linalg.norm(quotient)
+        assert error < 1e-5, (name, error)
+
+
+def test_jacobian_has_a_column_for_each_path_and_zero_where_it_does_not_act(base):
+    two = sample(recording("a"), recording("b", place=(-0.004, 0.004)))
+    p = predictor(model(suited("drift", "probing", separate=True)), two, settings=QUICK)
+    _, slopes = p.jacobian(VALUES, ["effects.drift.offset_z.a"])
+    column = slopes["effects.drift.offset_z.a"]
+    assert np.allclose(column["a"]["force"], [0, 0, 1])
+    assert not np.any(column["b"]["force"])
+    assert not np.any(column["a"]["markers"])
+
+
+def test_it_is_a_pure_function_inside_other_transformations(base, plain):
+    out = jax.eval_shape(lambda k: base.predict({**VALUES, "volumetric.K": k})["r1"].channels["force"].values, 1e4)
+    assert out.shape == plain.channels["force"].values.shape
+
+
+def test_a_broken_run_is_refused_not_masked(base):
+    with pytest.raises(UnstableSimulation, match=r"recording r1: the simulation broke down by t = .* element \d+ near"):
+        base.predict({**VALUES, "energy.C20": -6e4})
+
+
+def test_rest_positions_are_pooled_only_if_recordings_agree(rng):
+    rest = rng.normal(size=(4, 3))
+    calm = {n: np.arange(20) < 10 for n in "ab"}
+    still = {n: rest + rng.normal(0, 1e-3, (20, 4, 3)) for n in "ab"}
+    found = rest_positions(still, calm, 1e-3)
+    assert np.array_equal(found["a"], found["b"])
+    assert np.abs(found["a"] - rest).max() < 4e-3 / np.sqrt(20)
+    moved = {"a": still["a"], "b": still["b"] + [0, 0, 0.01]}
+    found = rest_positions(moved, calm, 1e-3)
+    assert np.allclose(found["b"][:, 2] - found["a"][:, 2], 0.01, atol=2e-3)
+    with pytest.raises(InputError, match="every marker is NaN"):
+        rest_positions({"a": np.full((5, 2, 3), np.nan)}, {"a": np.ones(5, bool)}, 1e-3)
+
+
+def shifted(r, **inputs):
+    return replace_inputs(r, **{k.replace("_", "/"): v for k, v in inputs.items()})
+
+
+def replace_inputs(r, **inputs):
+    from tissuejax.recordings.recording import Recording
+
+    return Recording(r.name, r.experiment, {**r.inputs, **inputs}, r.channels, r.attributes)
+
+
+def bad_samples():
+    r = recording()
+    path, time = r.inputs["probe/position"], r.inputs["probe/time"]
+    yield sample(shifted(r, probe_position=path - [0, 0, 0.006])), "starts .* mm inside the tissue"
+    yield sample(shifted(r, probe_position=path + [0, 0, 0.02])), "never touches the tissue"
+    yield sample(shifted(r, probe_time=time + 100)), "time bases don't overlap"
+    yield sample(recording(), geometry=None), "needs the body"
+    far = recording()
+    far.channels["markers"].values[...] += [0, 0, 0.02]
+    yield sample(far), r"markers lie off the surface; marker \d at"
+    lost = recording()
+    lost.channels["markers"].values[...] = np.nan
+    yield sample(lost), "every marker is NaN"
+    import equinox as eqx
+
+    yield sample(geometry=eqx.tree_at(lambda g: g.points, BODY, BODY.points * 1e3)), "millimetres"
+    yield sample(geometry=eqx.tree_at(lambda g: g.fixed, BODY, BODY.fixed[:1])), "floats"
+
+
+@pytest.mark.parametrize(("bad", "says"), list(bad_samples()), ids=lambda v: v[:24] if isinstance(v, str) else "")
+def test_bad_rigs_are_refused_with_a_sentence(bad, says):
+    with pytest.raises(InputError, match=says):
+        predictor(model(), bad, settings=QUICK)
+
+
+def test_missing_radius_and_bad_settings():
+    r = recording()
+    del r.attributes["probe/radius"]
+    with pytest.raises(InputError, match="no probe/radius"):
+        predictor(model(), sample(r), settings=QUICK)
+    with pytest.raises(InputError, match="compresion.*compression"):
+        predictor(model(), sample(), compresion=3)
+    with pytest.raises(InputError, match="must be positive"):
+        ProbingSettings(step=0.0)
