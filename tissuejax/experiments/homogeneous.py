@@ -88,7 +88,7 @@ class Homogeneous(Experiment):
     def predict(self, model: Model, values: Values, recording: Recording) -> Recording:
         """The recording that `model` would have given; see `Experiment.predict`."""
         known = local(model, values, recording.name)
-        return reported(recording, nominal_stress(model.across(()), known, self.test(recording)))
+        return reported(recording, _compiled(model.across(()), known, self.test(recording)))
 
 
 def axes(direction: object | None) -> np.ndarray:
@@ -151,6 +151,9 @@ def nominal_stress(model: Model, values: Values, test: MaterialTest) -> Float[Ar
     for effect, p in reversed(effects):
         stress = effect.stress(p, test, stress)
     return stress
+
+
+_compiled = jax.jit(nominal_stress, static_argnums=0)
 
 
 def specimen_stress(
