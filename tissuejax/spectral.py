@@ -164,8 +164,10 @@ def _first(m: int, s: Array, x: Array, y: Array) -> Array:
     return difference
 
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
-_NODES, _WEIGHTS = 0.5 * (_NODES + 1), 0.5 * _WEIGHTS
+# Gauss points (a, a b) and weights of the triangle 0 <= t2 <= t1 <= 1, each along one axis of 25.
+_G, _W = (0.5 * g for g in np.polynomial.legendre.leggauss(5))
+_A, _B = (g.ravel() for g in np.meshgrid(_G + 0.5, _G + 0.5, indexing="ij"))
+_WEIGHTS = np.outer(_W, _W).ravel() * _A
 
 
 def _second(m: int, s: Array, x: Array, y: Array, z: Array) -> Array:
@@ -175,10 +177,9 @@ def _second(m: int, s: Array, x: Array, y: Array, z: Array) -> Array:
     close = jnp.log(high) - jnp.log(low) < CLOSE
     gap = jnp.where(close, 1.0, high - low)
     apart = (_first(m, s, high, middle) - _first(m, s, middle, low)) / gap
-    integral = 0.0
-    for a, wa in zip(_NODES, _WEIGHTS):  # Hermite-Genocchi over the triangle, t2 = a b
-        for b, wb in zip(_NODES, _WEIGHTS):
-            integral = integral + wa * wb * a * _curvature(m, s, low + a * (middle - low) + a * b * (high - middle))
+    a, b, weight = (jnp.asarray(g, x.dtype).reshape(-1, *[1] * s.ndim) for g in (_A, _B, _WEIGHTS))
+    points = low + a * (middle - low) + a * b * (high - middle)  # Hermite-Genocchi: mean of f'' over the triangle
+    integral = jnp.sum(weight * _curvature(m, s, points), axis=0)
     return jnp.where(close, integral, apart)
 
 
