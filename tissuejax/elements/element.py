@@ -10,11 +10,13 @@ import abc
 from typing import Any, ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-Tensor9 = tuple[Float[Array, " E"], ...]  # a 3x3 tensor by rows: xx xy xz yx yy yz zx zy zz
+Tensor = Float[Array, "3 3 E"]
+barrier = jax.lax.optimization_barrier  # keeps stages apart, see `tled/internal.py`
 
 
 class Element(eqx.Module):
@@ -46,11 +48,11 @@ class Element(eqx.Module):
         """What depends on the reference node positions alone; the volume is its attribute `volume` (E,), m^3."""
 
     @abc.abstractmethod
-    def gradient(self, reference: Any, u: Float[Array, "3 k E"]) -> tuple[Tensor9, Any]:
+    def gradient(self, reference: Any, u: Float[Array, "3 k E"]) -> tuple[Tensor, Any]:
         """Deformation gradient F at the stress point, and what the element remembers for its hourglass force."""
 
     @abc.abstractmethod
-    def forces(self, reference: Any, P: Tensor9, memory: Any, stiffness: Float[Array, " E"]) -> Float[Array, "3 k E"]:
+    def forces(self, reference: Any, P: Tensor, memory: Any, stiffness: Float[Array, " E"]) -> Float[Array, "3 k E"]:
         """Nodal forces of the first Piola-Kirchhoff stress P (Pa) and of hourglass stiffness (Pa)."""
 
     @abc.abstractmethod
@@ -62,30 +64,28 @@ class Element(eqx.Module):
         """
 
 
-def determinant(F: Tensor9) -> Float[Array, " E"]:
+def determinant(F: Tensor) -> Float[Array, " E"]:
     """J = det F."""
-    a, b, c, d, e, f, g, h, i = F
+    (a, b, c), (d, e, f), (g, h, i) = F
     return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
 
 
-def cofactor(F: Tensor9) -> Tensor9:
+def cofactor(F: Tensor) -> Tensor:
     """cof F = J F^-T, the derivative of det F."""
-    a, b, c, d, e, f, g, h, i = F
-    return (
-        e * i - f * h, f * g - d * i, d * h - e * g,
-        c * h - b * i, a * i - c * g, b * g - a * h,
-        b * f - c * e, c * d - a * f, a * e - b * d,
-    )  # fmt: skip
+    (a, b, c), (d, e, f), (g, h, i) = F
+    rows = (
+        (e * i - f * h, f * g - d * i, d * h - e * g),
+        (c * h - b * i, a * i - c * g, b * g - a * h),
+        (b * f - c * e, c * d - a * f, a * e - b * d),
+    )
+    return jnp.stack([jnp.stack(r) for r in rows])
 
 
-def inverse(F: Tensor9) -> Tensor9:
+def inverse(F: Tensor) -> Tensor:
     """F^-1 = cof(F)^T / det F."""
-    J = determinant(F)
-    a, b, c, d, e, f, g, h, i = cofactor(F)
-    return tuple(x / J for x in (a, d, g, b, e, h, c, f, i))
+    return jnp.swapaxes(cofactor(F), 0, 1) / determinant(F)
 
 
-def largest_eigenvalue(xx, yy, zz, xy, xz, yz) -> Float[Array, " E"]:
-    """Largest eigenvalue of symmetric 3x3 matrices by components."""
-    rows = [jnp.stack(r, -1) for r in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))]
-    return jnp.linalg.eigvalsh(jnp.stack(rows, -2))[..., -1]
+def largest_eigenvalue(G: Tensor) -> Float[Array, " E"]:
+    """Largest eigenvalue of symmetric 3x3 matrices."""
+    return jnp.linalg.eigvalsh(jnp.moveaxis(G, -1, 0))[..., -1]

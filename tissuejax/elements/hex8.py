@@ -13,46 +13,35 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from tissuejax.elements.element import Element, Tensor9, determinant, inverse, largest_eigenvalue
+from tissuejax.elements.element import Element, Tensor, barrier, determinant, inverse, largest_eigenvalue
 
 SIGNS = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], float
 )
+XI, ETA, ZETA = SIGNS.T
+MODES = np.stack([XI, ETA, ZETA, XI * ETA, XI * ZETA, ETA * ZETA, XI * ETA * ZETA])
 
 
 class Reference(NamedTuple):
-    """`gradient`: (dxi_k/dX_J)/8, 9 arrays; `hourglass`: h_alpha . X_J, 12 arrays; `stiffening`: 1/64 of the
+    """`gradient`: (dxi_k/dX_J)/8, (k, J, E); `hourglass`: h_alpha . X_J, (alpha, J, E); `stiffening`: 1/64 of the
     hourglass stiffness per modulus, 8 V sum_a |B_a|^2, m; `volume`, m^3."""
 
-    gradient: tuple[Float[Array, " E"], ...]
-    hourglass: tuple[Float[Array, " E"], ...]
+    gradient: Float[Array, "3 3 E"]
+    hourglass: Float[Array, "4 3 E"]
     stiffening: Float[Array, " E"]
     volume: Float[Array, " E"]
 
 
-def modes(n: Float[Array, "8 E"]) -> tuple[Float[Array, " E"], ...]:
-    """Gradient modes (xi, eta, zeta) and hourglass modes (xi eta, xi zeta, eta zeta, xi eta zeta) of nodal values."""
-
-    def quad(a, b, c, d):
-        low, high, left, right = b + a, c + d, b - a, c - d
-        return high + low, left + right, high - low, right - left  # 1, xi, eta, xi eta
-
-    s = quad(*(n[a + 4] + n[a] for a in range(4)))
-    d = quad(*(n[a + 4] - n[a] for a in range(4)))
-    return s[1], s[2], d[0], s[3], d[1], d[2], d[3]
+def modes(n: Float[Array, "3 8 E"]) -> Float[Array, "7 3 E"]:
+    """Three gradient modes (xi, eta, zeta) and four hourglass modes of nodal vectors."""
+    signs = jnp.asarray(MODES, n.dtype)[:, :, None, None]
+    return sum(signs[:, a] * n[None, :, a] for a in range(8))
 
 
-def nodal(xi, eta, zeta, xieta, xizeta, etazeta, all_three) -> tuple[Float[Array, " E"], ...]:
-    """Nodal values of the seven modes: the transpose of `modes`."""
-
-    def quad(one, x, e, xe):
-        low, high, left, right = one - e, one + e, x - xe, x + xe
-        return low - left, low + left, high + right, high - right
-
-    # a node's value is s -+ d with s the even part and d the odd part in zeta
-    s = quad(0.0, xi, eta, xieta)
-    d = quad(zeta, xizeta, etazeta, all_three)
-    return tuple(s[a] - d[a] for a in range(4)) + tuple(s[a] + d[a] for a in range(4))
+def nodal(g: Float[Array, "3 3 E"], h: Float[Array, "4 3 E"]) -> Float[Array, "3 8 E"]:
+    """Nodal vectors of gradient and hourglass modes: the transpose of `modes`."""
+    signs = jnp.asarray(MODES, g.dtype)[:, None, :, None]
+    return sum(signs[k] * g[k][:, None] for k in range(3)) + sum(signs[3 + a] * h[a][:, None] for a in range(4))
 
 
 class Hex8(Element):
@@ -68,40 +57,28 @@ class Hex8(Element):
         return jnp.prod(1 + xi[:, None, :] * SIGNS, axis=-1) / 8
 
     def reference(self, x: Float[Array, "3 8 E"]) -> Reference:
-        m = [modes(x[i]) for i in range(3)]
-        jacobian = tuple(m[i][k] / 8 for i in range(3) for k in range(3))  # dX_i/dxi_k
+        m = modes(x)
+        jacobian = jnp.swapaxes(m[:3], 0, 1) / 8  # dX_i/dxi_k
         volume = 8 * determinant(jacobian)
-        gradient = tuple(g / 8 for g in inverse(jacobian))  # by rows: k, then J
-        hourglass = tuple(m[i][3 + a] for a in range(4) for i in range(3))
-        squares = sum(8 * g * g for g in gradient)  # sum_a |grad N_a|^2, 1.5/h^2 in a cube
-        return Reference(gradient, hourglass, 8 * volume * squares / 64, volume)
+        gradient = inverse(jacobian) / 8
+        squares = 8 * jnp.sum(gradient * gradient, (0, 1))  # sum_a |grad N_a|^2, 1.5/h^2 in a cube
+        return Reference(gradient, m[3:], 8 * volume * squares / 64, volume)
 
-    def gradient(self, reference: Reference, u: Float[Array, "3 8 E"]) -> tuple[Tensor9, Any]:
+    def gradient(self, reference: Reference, u: Float[Array, "3 8 E"]) -> tuple[Tensor, Any]:
         A, X = reference.gradient, reference.hourglass
-        F, q = [], []
-        for i in range(3):
-            m = modes(u[i])
-            H = [m[0] * A[J] + m[1] * A[3 + J] + m[2] * A[6 + J] for J in range(3)]
-            q += [m[3 + a] - (X[3 * a] * H[0] + X[3 * a + 1] * H[1] + X[3 * a + 2] * H[2]) for a in range(4)]
-            F += [h + 1.0 if i == J else h for J, h in enumerate(H)]
-        return tuple(F), tuple(q)
+        m = barrier(modes(u))
+        H = barrier(sum(m[k][:, None] * A[k][None] for k in range(3)))  # du_i/dX_J
+        q = m[3:] - sum(X[:, J][:, None] * H[:, J][None] for J in range(3))
+        return H + jnp.eye(3, dtype=H.dtype)[:, :, None], q
 
-    def forces(self, reference: Reference, P: Tensor9, memory: Any, stiffness: Float[Array, " E"]) -> Array:
+    def forces(self, reference: Reference, P: Tensor, memory: Any, stiffness: Float[Array, " E"]) -> Array:
         A, X, V = reference.gradient, reference.hourglass, reference.volume
-        kappa = reference.stiffening * stiffness
-        rows = []
-        for i in range(3):
-            h = [kappa * memory[4 * i + a] for a in range(4)]
-            T = [V * P[3 * i + J] - sum(X[3 * a + J] * h[a] for a in range(4)) for J in range(3)]
-            g = [sum(T[J] * A[3 * k + J] for J in range(3)) for k in range(3)]
-            rows.append(jnp.stack(nodal(*g, *h)))
-        return jnp.stack(rows)
+        h = barrier(reference.stiffening * stiffness * memory)
+        T = barrier(V * P - sum(h[a][:, None] * X[a][None] for a in range(4)))
+        g = barrier(sum(A[:, J][:, None] * T[:, J][None] for J in range(3)))
+        return nodal(g, h)
 
     def steepness(self, reference: Reference, hourglass: float) -> Float[Array, " E"]:
         A = reference.gradient
-
-        def product(I, J):
-            return 64 * sum(A[3 * k + I] * A[3 * k + J] for k in range(3))  # nodes * sum_a B_aI B_aJ
-
-        waves = largest_eigenvalue(*(product(*ij) for ij in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))))
-        return jnp.maximum(waves, hourglass * 64 * sum(g * g for g in A))
+        G = 64 * jnp.einsum("kie,kje->ije", A, A)  # nodes * sum_a B_a B_a^T
+        return jnp.maximum(largest_eigenvalue(G), hourglass * 64 * jnp.sum(A * A, (0, 1)))

@@ -11,13 +11,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from tissuejax.elements.element import Element, Tensor9, determinant, inverse, largest_eigenvalue
+from tissuejax.elements.element import Element, Tensor, determinant, inverse, largest_eigenvalue
 
 
 class Reference(NamedTuple):
-    """`gradient`: grad N of nodes 1 to 3 (node 0 has minus their sum), 9 arrays; `volume`, m^3."""
+    """`gradient`: grad N of nodes 1 to 3 (node 0 has minus their sum), (node, J, E); `volume`, m^3."""
 
-    gradient: tuple[Float[Array, " E"], ...]
+    gradient: Float[Array, "3 3 E"]
     volume: Float[Array, " E"]
 
 
@@ -33,26 +33,19 @@ class Tet4(Element):
         return jnp.concatenate([1 - jnp.sum(xi, 1, keepdims=True), xi], axis=1)
 
     def reference(self, x: Float[Array, "3 4 E"]) -> Reference:
-        jacobian = tuple(x[i, k + 1] - x[i, 0] for i in range(3) for k in range(3))  # dX_i/dxi_k
+        jacobian = x[:, 1:] - x[:, :1]  # dX_i/dxi_k
         return Reference(inverse(jacobian), determinant(jacobian) / 6)
 
-    def gradient(self, reference: Reference, u: Float[Array, "3 4 E"]) -> tuple[Tensor9, Any]:
-        B = reference.gradient
-        d = [[u[i, a + 1] - u[i, 0] for a in range(3)] for i in range(3)]
-        F = [sum(d[i][a] * B[3 * a + J] for a in range(3)) + float(i == J) for i in range(3) for J in range(3)]
-        return tuple(F), ()
+    def gradient(self, reference: Reference, u: Float[Array, "3 4 E"]) -> tuple[Tensor, Any]:
+        d, B = u[:, 1:] - u[:, :1], reference.gradient
+        H = sum(d[:, a][:, None] * B[a][None] for a in range(3))
+        return H + jnp.eye(3, dtype=H.dtype)[:, :, None], ()
 
-    def forces(self, reference: Reference, P: Tensor9, memory: Any, stiffness: Float[Array, " E"]) -> Array:
-        B, V = reference.gradient, reference.volume
-        f = [[V * sum(P[3 * i + J] * B[3 * a + J] for J in range(3)) for a in range(3)] for i in range(3)]
-        return jnp.stack([jnp.stack([-(r[0] + r[1] + r[2]), *r]) for r in f])
+    def forces(self, reference: Reference, P: Tensor, memory: Any, stiffness: Float[Array, " E"]) -> Array:
+        B = reference.gradient
+        f = reference.volume * sum(P[:, J][:, None] * B[:, J][None] for J in range(3))  # (i, node, E)
+        return jnp.concatenate([-jnp.sum(f, 1, keepdims=True), f], 1)
 
     def steepness(self, reference: Reference, hourglass: float) -> Float[Array, " E"]:
-        B = reference.gradient
-        nodes = [[-sum(B[3 * a + J] for a in range(3)) for J in range(3)]]
-        nodes += [[B[3 * a + J] for J in range(3)] for a in range(3)]
-
-        def product(i, j):
-            return 4 * sum(b[i] * b[j] for b in nodes)
-
-        return largest_eigenvalue(*(product(*ij) for ij in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))))
+        B = jnp.concatenate([-jnp.sum(reference.gradient, 0, keepdims=True), reference.gradient])
+        return largest_eigenvalue(4 * jnp.einsum("aie,aje->ije", B, B))

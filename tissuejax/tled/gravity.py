@@ -1,7 +1,7 @@
 """The stress-free shape of an organ that was measured as it lay there, settled under its own weight.
 
-Reversing gravity and applying it again is only approximate (source 2.2.4). Here the shape X is sought from which gravity
-settles the organ to the measured x: X <- X - (X + u(X) - x), u(X) by dynamic relaxation, repeated until it comes back.
+Reversing gravity and applying it again is only approximate (source 2.2.4). Here the shape X is sought from which
+gravity settles the organ to the measured x: X <- X - (X + u(X) - x), u(X) by dynamic relaxation, until it comes back.
 The derivative is that of the inverse equilibrium: f_int(X, x - X) = weight(X) at the nodes that are free, solved once
 more for dX, so a fit carries it whenever the material changes.
 """

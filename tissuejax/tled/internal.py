@@ -93,18 +93,19 @@ def settled(scene: Scene) -> Float[Array, "3 N"]:
 
 def cauchy_green(F) -> Sym:
     """C = F^T F."""
-    a, b, c, d, e, f, g, h, i = F
-    return Sym(
-        a * a + d * d + g * g, b * b + e * e + h * h, c * c + f * f + i * i,
-        a * b + d * e + g * h, a * c + d * f + g * i, b * c + e * f + h * i,
-    )  # fmt: skip
+    a, b, c = F[:, 0], F[:, 1], F[:, 2]
+
+    def dot(p, q):
+        return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
+
+    return Sym(dot(a, a), dot(b, b), dot(c, c), dot(a, b), dot(a, c), dot(b, c))
 
 
 def first_piola(F, S):
-    """P = F S by components."""
+    """P = F S, (3, 3, E)."""
     xx, yy, zz, xy, xz, yz = S
     rows = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-    return tuple(sum(F[3 * i + k] * rows[k][j] for k in range(3)) for i in range(3) for j in range(3))
+    return jnp.stack(barrier(tuple(sum(F[:, k] * rows[k][j] for k in range(3)) for j in range(3))), 1)
 
 
 def _isochoric_energy(scene: Scene, strain: Strain):
@@ -204,7 +205,7 @@ def forces(scene: Scene, mesh: Mesh, u: Float[Array, "3 N"], history: History, s
     P = first_piola(F, S)
     if element.averaged_pressure:
         p, _ = averaged_pressure(scene, mesh, F)
-        P = tuple(a + p * c for a, c in zip(P, cofactor(F), strict=True))
+        P = P + p * cofactor(F)
     P = barrier(P)
     fe = element.forces(mesh.reference, P, memory, shear * mesh.stiffness)
     return barrier(add(barrier(fe), mesh.cells, len(mesh.mass))), history

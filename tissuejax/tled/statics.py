@@ -2,9 +2,9 @@
 
 The explicit machinery is run with fictitious masses, for which every element's critical step is about one, and with the
 damping that is critical for the slowest mode, estimated as it goes by a Rayleigh quotient (Underwood 1983; Joldes,
-Wittek & Miller 2009). The derivative does not go through the iterations: at the solution the tangent stiffness is solved
-by conjugate gradients, K du = -dr, forwards or in reverse, for any number of parameters. float32 stalls at a relative
-residual of about 1e-4; statics wants float64.
+Wittek & Miller 2009). The derivative does not go through the iterations: at the solution K du = -dr is solved by
+conjugate gradients, forwards or in reverse, for any number of parameters. float32 stalls at a relative residual of
+about 1e-4; statics wants float64.
 """
 
 from functools import partial
