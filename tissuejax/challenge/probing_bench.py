@@ -1,0 +1,189 @@
+"""One probing recording: what moves, the equilibrium along the way, and what sensors and clocks make of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from tissuejax.challenge.lobe import Lobe, graded
+from tissuejax.challenge.material import Ingredient
+from tissuejax.challenge.probe_paths import Path, between, gap, stops
+from tissuejax.challenge.quasistatic import Bed, Bench
+from tissuejax.challenge.solid import Solid, Tissue
+from tissuejax.challenge.touch import Membrane, Sphere
+
+MESH = (16, 16, 6)
+STRIDE = 5e-4
+FORCE_RATE, MARKER_RATE, PROBE_RATE = 62.5, 15.0, 100.0
+
+
+@dataclass(frozen=True)
+class Record:
+    """One probing recording, in the units of the file.
+
+    Attributes:
+        name: group name.
+        start: s after the first recording.
+        radius: of the tip, m.
+        time, probe: of the tip's centre as recorded, s and m.
+        force_time, force: on the probe, s and N.
+        marker_time, markers: s and m.
+    """
+
+    name: str
+    start: float
+    radius: float
+    time: Float[np.ndarray, " n"]
+    probe: Float[np.ndarray, "n 3"]
+    force_time: Float[np.ndarray, " f"]
+    force: Float[np.ndarray, "f 3"]
+    marker_time: Float[np.ndarray, " m"]
+    markers: Float[np.ndarray, "m k 3"]
+
+
+def record(
+    lobe: Lobe,
+    tissue: Tissue,
+    ingredients: list[Ingredient],
+    path: Path,
+    site: tuple[float, float],
+    sites: list[tuple[float, float]],
+    radius: float,
+    places: list[tuple[float, float]],
+    number: int,
+    clock: tuple[float, float],
+    phase: float,
+    mesh: tuple[int, int, int] = MESH,
+) -> Record:
+    """Solve one recording without noise.
+
+    Args:
+        site: place under the probe, m; `sites` those of all recordings.
+        places: surface parameters of the markers.
+        number: of the recording, from 0.
+        clock: start of this recording and of the last one, s.
+        phase: of a moving support in this recording.
+        mesh: hexes along each direction.
+    """
+    have = {i.name: i for i in ingredients}
+    support = supported(have, path, phase)
+    offset = np.zeros(3)
+    if "registration" in have:
+        offset[:2] = have["registration"].amount * np.array(have["registration"].shape["way"])
+    if "contact-offset" in have:
+        offset[2] = have["contact-offset"].amount * have["contact-offset"].shape["signs"][number]
+
+    def motion(t: np.ndarray) -> np.ndarray:
+        return path.at(t) + offset - support(t)
+
+    bench, watch = assembled(lobe, tissue, have, site, sites, radius, places, motion(path.time), mesh)
+    history = bool(set(have) & {"viscoelasticity"}) or "periodic" in have
+    every = 0.12 if "periodic" in have else 0.8 if history else None
+    at, pieces = stops(path, motion, lobe, radius, 0.7 * STRIDE if history else STRIDE, every)
+    where = motion(at)
+    close = gap(lobe, where, radius) < (1e-3 if "adhesion" in have else 1e-4)
+    force, moved = np.zeros((len(at), 3)), np.zeros((len(at), len(places), 3))
+    if close.any():
+        force[close], moved[close] = bench.follow(at[close], where[close], watch)
+    rest = lobe.point(*np.array(places).T, np.ones(len(places)))
+    end = path.time[-1]
+    time, ft, mt = (np.arange(a / r, end, 1 / r) for a, r in ((0, PROBE_RATE), (0.25, FORCE_RATE), (0.3, MARKER_RATE)))
+    lag = have["clock-lag"].amount if "clock-lag" in have else 0.0
+    seen = np.clip(mt - lag, 0, end)
+    shown = rest + between(pieces, at, moved, seen) + support(seen)[:, None]
+    if "registration" in have:
+        shown = shown - offset
+    felt = sensed(have, path, between(pieces, at, force, ft), ft, clock)
+    probe = path.at(time)
+    if "machine-compliance" in have:  # the tip went where it went; the actuator had to go further by c F
+        probe = probe - have["machine-compliance"].amount * between(pieces, at, force, time)
+    return Record(f"r{number + 1}", float(clock[0]), radius, time, probe, ft, felt, mt, shown)
+
+
+def supported(have: dict[str, Ingredient], path: Path, phase: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Motion of the support over time, m."""
+
+    def support(t: np.ndarray) -> np.ndarray:
+        shift = np.zeros((len(t), 3))
+        if "periodic" in have:
+            i = have["periodic"]
+            angle = 2 * np.pi * t / i.shape["period"] + phase
+            wave = np.sin(angle) + i.shape["second"] * np.sin(2 * angle + 1.9)
+            shift += i.amount * wave[:, None] * np.array([-0.08, 0.06, 1.0])
+        if "tissue-slip" in have:
+            i = have["tissue-slip"]
+            when = i.shape["where"] * path.time[-1]
+            shift += i.amount / (1 + np.exp(-(t - when) / 0.02))[:, None] * np.array(i.shape["way"])
+        return shift
+
+    return support
+
+
+def assembled(lobe, tissue, have, site, sites, radius, places, way, mesh) -> tuple[Bench, Callable]:
+    """The bench of one recording and the function that reads the markers' displacements."""
+    if "viscoelasticity" in have:
+        i = have["viscoelasticity"]
+        split = i.shape["split"]
+        tissue = replace(tissue, g=(i.amount * split, i.amount * (1 - split)), tau=tuple(i.shape["tau"]))
+    if "softening" in have:
+        tissue = replace(tissue, damage=have["softening"].amount, damage_energy=have["softening"].shape["energy"])
+    if "anisotropy" in have:
+        tissue = replace(tissue, fibre=have["anisotropy"].amount, along=tuple(have["anisotropy"].shape["along"]))
+    fine = 0.14 if radius > 0.007 else 0.1
+    grid = graded(lobe, lobe.parameters(*site), *mesh, fine=fine, reach=0.3)
+    solid = Solid(grid, tissue)
+    if "inclusion" in have:
+        i = have["inclusion"]
+        x, y = np.array(sites[i.shape["under"]]) + np.array(i.shape["aside"])
+        top = float(lobe.height(*map(np.asarray, lobe.parameters(x, y))))
+        far = np.linalg.norm((solid.places - [x, y, top - i.shape["depth"]]) / i.shape["axes"], axis=-1)
+        solid = Solid(grid, tissue, i.amount ** (1 / (1 + np.exp(np.clip((far - 1) / 0.06, -60, 60)))))
+    middle = grid.points[grid.top].mean(1)
+    reach = radius + 7e-3
+    near = np.min(np.linalg.norm(middle[:, None, :2] - way[None, :, :2], axis=-1), axis=1) < reach
+    sphere = Sphere(grid, grid.top[near], radius)
+    if "friction" in have:
+        sphere.friction = have["friction"].amount
+    if "adhesion" in have:
+        sphere.pull, sphere.range = have["adhesion"].amount, have["adhesion"].shape["range"]
+    bed = Bed(have["base-slip"].amount) if "base-slip" in have else Bed()
+    skin = Membrane(grid, have["capsule"].amount) if "capsule" in have else None
+    weights = [grid.on_top(*p) for p in places]
+
+    def watch(u: np.ndarray) -> np.ndarray:
+        return np.array([w @ u[nodes] for nodes, w in weights])
+
+    return Bench(solid, sphere, bed, skin), watch
+
+
+def sensed(
+    have: dict[str, Ingredient], path: Path, F: np.ndarray, t: np.ndarray, clock: tuple[float, float]
+) -> np.ndarray:
+    """Force as the sensor reports it, N."""
+    if "aging" in have:
+        F = F * np.exp(have["aging"].amount * (clock[0] + t) / clock[1])[:, None]
+    if "warmed" in have:
+        i = have["warmed"]
+        F = F * (1 + i.amount * np.sin(2 * np.pi * t / i.shape["period"] + i.shape["phase"]))[:, None]
+    if "cured" in have:
+        still = np.flatnonzero(
+            (np.abs(np.diff(path.place[:, 2])) < 1e-9) & (path.place[1:, 2] < path.place[0, 2] - 2e-3)
+        )
+        since = np.maximum(t - path.time[still[0]], 0)
+        F = F * (1 - have["cured"].amount * np.expm1(-since / have["cured"].shape["time"]))[:, None]
+    if "rubbing" in have:
+        i = have["rubbing"]
+        z = path.at(t)[:, 2]
+        q = np.zeros(len(t))
+        for k in range(1, len(t)):
+            q[k] = np.clip(q[k - 1] - i.amount / i.shape["travel"] * (z[k] - z[k - 1]), -i.amount, i.amount)
+        F = F + q[:, None] * np.array([0, 0, 1.0])
+    if "drift" in have:
+        i = have["drift"]
+        zero = i.amount * (i.shape["mix"][0] + i.shape["mix"][1] * t / 10)
+        F = F + zero[:, None] * np.array([0.2, -0.1, 1.0])
+    if "saturated" in have:
+        limit = (1 - have["saturated"].amount) * np.abs(F[:, 2]).max()
+        F = np.clip(F, -limit, limit)
+    return F

@@ -1,0 +1,213 @@
+"""Mean-dilatation hexes ("q1p0"): forces and tangents of a reduced polynomial body, derived by hand, in plain numpy.
+
+Energy of an element: sum over 2x2x2 points of W(I1bar) plus V K/2 (Jmean - 1)^2, with I1bar = J^(-2/3) tr C and
+Jmean = (1/V) sum w J. Its first and second derivatives are
+
+    P = 2 W' J^(-2/3) (F - tr C / 3 F^-T),     dP/dF = W'' H H + W' dH/dF,     K (Jmean - 1) d(sum w J), ...
+
+A history enters as an affine map of the elastic stress, S = c S_e + S_0 (relaxation over one step), and as a factor
+(damage). Sources: Simo, Taylor and Pister 1985; Holzapfel 2000, section 6.10 for the relaxation.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from tissuejax.challenge.lobe import Grid
+
+CORNERS = np.array([[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]])
+
+
+@dataclass(frozen=True)
+class Tissue:
+    """Constants of a body, Pa unless said.
+
+    Attributes:
+        C10, C20, C30: of W = C10 x + C20 x^2 + C30 x^3, x = I1bar - 3.
+        K: of K/2 (Jmean - 1)^2.
+        g, tau: relaxing shares of the isochoric stress and their times, s.
+        leak, leak_tau: relaxing share of the pressure and its time, s.
+        damage, damage_energy: softening 1 - damage tanh((Wmax - W) / damage_energy).
+        fibre: stiffness k of k/2 (I4 - 1)^2 in tension, along `along`.
+    """
+
+    C10: float
+    C20: float
+    K: float
+    C30: float = 0.0
+    g: tuple[float, ...] = ()
+    tau: tuple[float, ...] = ()
+    leak: float = 0.0
+    leak_tau: float = 1.0
+    damage: float = 0.0
+    damage_energy: float = 1.0
+    fibre: float = 0.0
+    along: tuple[float, float, float] = (1.0, 0.0, 0.0)
+
+
+@dataclass
+class Past:
+    """What an element's points remember of the last accepted step; None where the tissue has no memory."""
+
+    S: np.ndarray | None = None
+    h: np.ndarray | None = None
+    top: np.ndarray | None = None
+    p: np.ndarray | None = None
+    hp: np.ndarray | None = None
+
+
+@dataclass
+class Solid:
+    """All hexes of a grid.
+
+    Attributes:
+        factor: stiffness of each hex relative to the tissue, at its points (E, 8).
+    """
+
+    grid: Grid
+    tissue: Tissue
+    factor: Float[np.ndarray, "E 8"] | None = None
+    past: Past = field(default_factory=Past)
+
+    def __post_init__(self):
+        X = self.grid.points[self.grid.cells]
+        E = len(X)
+        s = CORNERS / np.sqrt(3)
+        dN = np.stack([[CORNERS[a] / 8 * np.array([
+            (1 + q[1] * CORNERS[a, 1]) * (1 + q[2] * CORNERS[a, 2]),
+            (1 + q[0] * CORNERS[a, 0]) * (1 + q[2] * CORNERS[a, 2]),
+            (1 + q[0] * CORNERS[a, 0]) * (1 + q[1] * CORNERS[a, 1]),
+        ]) for a in range(8)] for q in s])  # fmt: skip
+        jac = np.einsum("eai,qaj->eqij", X, dN)
+        self.w = np.linalg.det(jac)
+        if self.w.min() <= 0:
+            raise ValueError("a hex of the challenge mesh is turned inside out")
+        self.G = np.einsum("qaj,eqji->eqai", dN, np.linalg.inv(jac)).reshape(E * 8, 8, 3)
+        N = np.prod([(1 + s[:, None, i] * CORNERS[None, :, i]) / 2 for i in range(3)], axis=0)
+        self.places = np.einsum("qa,eai->eqi", N, X)
+        self.V = self.w.sum(1)
+        if self.factor is None:
+            self.factor = np.ones((E, 8))
+        self.mean_factor = (self.factor * self.w).sum(1) / self.V
+        self._f, self._w = self.factor.ravel(), self.w.ravel()
+
+    def state(self, u: Float[np.ndarray, "N 3"], dt: float, tangent: bool) -> dict:
+        """Forces (E, 8, 3), tangents (E, 8, 3, 8, 3) if asked for, energy, and what a step would leave behind."""
+        t = self.tissue
+        n, E = len(self._w), len(self.V)
+        x = (self.grid.points + u)[self.grid.cells]
+        F = np.swapaxes(np.repeat(x, 8, 0).reshape(n, 8, 3), 1, 2) @ self.G
+        J = np.linalg.det(F)
+        if J.min() <= 0.02:
+            return {"bad": True}
+        Fit = np.swapaxes(np.linalg.inv(F), 1, 2)
+        I = np.einsum("nij,nij->n", F, F)
+        thin = J ** (-2 / 3)
+        y = thin * I - 3
+        W = self._f * (t.C10 * y + t.C20 * y**2 + t.C30 * y**3)
+        w1 = self._f * (t.C10 + 2 * t.C20 * y + 3 * t.C30 * y**2)
+        w2 = self._f * (2 * t.C20 + 6 * t.C30 * y)
+        D = F - (I / 3)[:, None, None] * Fit
+        H = (2 * thin)[:, None, None] * D
+        P = w1[:, None, None] * H
+        A = None
+        if tangent:
+            A = _outer(w2[:, None, None] * H, H)
+            k = 2 * w1 * thin
+            A -= _outer((2 / 3 * k)[:, None, None] * Fit, F) + _outer((2 / 3 * k)[:, None, None] * D, Fit)
+            A += (k * I / 3)[:, None, None, None, None] * np.einsum("nil,nkj->nijkl", Fit, Fit)
+            A[:, [0, 0, 0, 1, 1, 1, 2, 2, 2], [0, 1, 2] * 3, [0, 0, 0, 1, 1, 1, 2, 2, 2], [0, 1, 2] * 3] += k[:, None]
+        if t.fibre:
+            a = np.asarray(t.along) / np.linalg.norm(t.along)
+            Fa = F @ a
+            e = np.maximum(np.einsum("ni,ni->n", Fa, Fa) - 1, 0)
+            on = (e > 0) * 1.0
+            P = P + (2 * t.fibre * self._f * e)[:, None, None] * Fa[:, :, None] * a
+            W = W + t.fibre / 2 * self._f * e**2
+            if tangent:
+                B = Fa[:, :, None] * a
+                A += _outer((4 * t.fibre * self._f * on)[:, None, None] * B, B)
+                A += (2 * t.fibre * self._f * e)[:, None, None, None, None] * np.einsum("ik,j,l->ijkl", np.eye(3), a, a)
+        left = {"W": W}
+        if t.damage:
+            top = np.maximum(self.past.top if self.past.top is not None else 0 * W, W)
+            arg = (top - W) / t.damage_energy
+            eta = 1 - t.damage * np.tanh(arg)
+            if tangent:
+                slope = np.where(arg > 0, t.damage / t.damage_energy / np.cosh(np.minimum(arg, 50)) ** 2, 0.0)
+                A = eta[:, None, None, None, None] * A + _outer(slope[:, None, None] * P, P)
+            P = eta[:, None, None] * P
+            left["top"] = top
+        if t.g:
+            S = np.swapaxes(Fit, 1, 2) @ P
+            c, S0, keep = self._relaxed(S, dt)
+            P = c * P + F @ S0
+            if tangent:
+                A = c * A
+                for i in range(3):
+                    A[:, i, :, i, :] += np.swapaxes(S0, 1, 2)
+            left |= keep
+        Jm = (self.w * J.reshape(E, 8)).sum(1) / self.V
+        p = t.K * self.mean_factor * (Jm - 1)
+        cp = np.ones(1)
+        if t.leak:
+            c, p, keep = self._leaked(p, dt)
+            cp = np.array([c])
+            left |= keep
+        cof = J[:, None, None] * Fit
+        p8 = np.repeat(p, 8)
+        P = P + p8[:, None, None] * cof
+        Pw = P * self._w[:, None, None]
+        f = np.einsum("eqij,eqaj->eai", Pw.reshape(E, 8, 3, 3), self.G.reshape(E, 8, 8, 3))
+        left["f"] = f
+        left["energy"] = float(np.sum(W * self._w) + np.sum(self.V * t.K * self.mean_factor * (Jm - 1) ** 2) / 2)
+        if tangent:
+            A += (p8 * J)[:, None, None, None, None] * (
+                Fit[:, :, :, None, None] * Fit[:, None, None] - np.einsum("nil,nkj->nijkl", Fit, Fit)
+            )
+            left["K"] = self._stiffness(A, cof, cp * t.K * self.mean_factor / self.V)
+        return left
+
+    def _stiffness(self, A: np.ndarray, cof: np.ndarray, bulk: np.ndarray) -> np.ndarray:
+        E = len(self.V)
+        A = A * self._w[:, None, None, None, None]
+        right = A.reshape(-1, 27, 3) @ np.swapaxes(self.G, 1, 2)  # (i j k) b
+        right = right.reshape(E, 8, 3, 3, 24).transpose(0, 1, 3, 2, 4).reshape(E, 24, 72)  # (q j) (i k b)
+        left = self.G.reshape(E, 8, 8, 3).transpose(0, 2, 1, 3).reshape(E, 8, 24)  # a (q j)
+        K = (left @ right).reshape(E, 8, 3, 3, 8).transpose(0, 1, 2, 4, 3).copy()  # a i b k
+        weighted = (cof * self._w[:, None, None]).reshape(E, 8, 3, 3)
+        b = np.einsum("eqij,eqaj->eai", weighted, self.G.reshape(E, 8, 8, 3)).reshape(E, 24)
+        K = K.reshape(E, 24, 24)
+        K += bulk[:, None, None] * b[:, :, None] * b[:, None, :]
+        return K
+
+    def _relaxed(self, S: np.ndarray, dt: float) -> tuple[float, np.ndarray, dict]:
+        t = self.tissue
+        old = self.past.S if self.past.S is not None else np.zeros_like(S)
+        h = self.past.h if self.past.h is not None else np.zeros((len(t.g), *S.shape))
+        c, S0, new = 1 - sum(t.g), np.zeros_like(S), np.empty_like(h)
+        for i, (g, tau) in enumerate(zip(t.g, t.tau)):
+            decay, gain = np.exp(-dt / tau), -np.expm1(-dt / tau) * tau / dt if dt > 0 else 1.0
+            new[i] = decay * h[i] + gain * (S - old)
+            c += g * gain
+            S0 += g * (decay * h[i] - gain * old)
+        return c, S0, {"S": S, "h": new}
+
+    def _leaked(self, p: np.ndarray, dt: float) -> tuple[float, np.ndarray, dict]:
+        t = self.tissue
+        old = self.past.p if self.past.p is not None else np.zeros_like(p)
+        h = self.past.hp if self.past.hp is not None else np.zeros_like(p)
+        decay, gain = np.exp(-dt / t.leak_tau), -np.expm1(-dt / t.leak_tau) * t.leak_tau / dt if dt > 0 else 1.0
+        new = decay * h + gain * (p - old)
+        return 1 - t.leak + t.leak * gain, (1 - t.leak) * p + t.leak * new, {"p": p, "hp": new}
+
+    def accept(self, left: dict) -> None:
+        """Remember a step."""
+        for name in ("S", "h", "top", "p", "hp"):
+            if name in left:
+                setattr(self.past, name, left[name])
+
+
+def _outer(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[:, :, :, None, None] * b[:, None, None, :, :]
