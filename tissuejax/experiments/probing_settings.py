@@ -50,7 +50,7 @@ class ProbingSettings:
     margin: float = 0.006
     nearest_node: bool = False
     precision: str = "float32"
-    threads: int = 2
+    threads: int = 1
     tangents: int = 3
 
     def __post_init__(self):
