@@ -11,6 +11,7 @@ sensor. All functions are pure; time is the trailing axis of every tensor compon
 """
 
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import ClassVar
 
 import jax
@@ -26,7 +27,7 @@ from tissuejax.experiments.experiment import Experiment
 from tissuejax.experiments.free_faces import lateral
 from tissuejax.experiments.kinematics import Gradient, deformation, hydrostatic, in_sample, nominal, right_cauchy_green
 from tissuejax.model import Model
-from tissuejax.parameters import under
+from tissuejax.parameters import Parameter, under
 from tissuejax.recordings.recording import Channel, Recording
 from tissuejax.tensors import Sym, determinant
 
@@ -112,15 +113,21 @@ def local(model: Model, values: Values, recording: str) -> dict[str, Array]:
     Raises:
         InputError: a path that the model doesn't know.
     """
-    declared = model.declared
+    declared = _declared(model)
     found = {}
     for path, parameter in declared.items():
-        source = next((s for s in model.source_of(path, recording) if s in values), None)
-        found[path] = parameter.default if source is None else values[source]
+        own = f"{path}.{recording}"
+        source = own if parameter.each and own in values else path
+        found[path] = values.get(source, parameter.default)
     for path in values:
         if path not in declared and not any(path.startswith(f"{d}.") and p.each for d, p in declared.items()):
             raise unknown("parameter", path, model.parameters)
     return found
+
+
+@lru_cache(maxsize=64)
+def _declared(model: Model) -> dict[str, Parameter]:
+    return model.declared
 
 
 def reported(recording: Recording, stress: Float[Array, "n ..."]) -> Recording:

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import ClassVar
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -31,6 +32,7 @@ class HomogeneousPredictor(Predictor):
 
     Attributes:
         tests: what was done in each recording, padded.
+        reduced: models without their neutral effects, kept by what is zero and what is wanted.
     """
 
     name: ClassVar[str] = "homogeneous"
@@ -38,6 +40,7 @@ class HomogeneousPredictor(Predictor):
     sample: Sample
     names: tuple[str, ...]
     tests: Mapping[str, MaterialTest]
+    reduced: dict = eqx.field(default_factory=dict)
 
     @classmethod
     def prepare(cls, model: Model, sample: Sample, names: tuple[str, ...], **options) -> "HomogeneousPredictor":
@@ -84,10 +87,15 @@ class HomogeneousPredictor(Predictor):
     def _within(self, values: Values, name: str, wanted: Sequence[str] = ()) -> tuple[Model, dict[str, Array]]:
         """The model without effects that are off in recording `name`, and the value of each of its parameters."""
         known = local(self.model, values, name)
-        model = self.model.across(())
-        if not any(map(_traced, known.values())):
-            model = model.active(known, wanted)
-        return model, {path: known[path] for path in model.declared}
+        if any(map(_traced, known.values())):
+            return self.model.across(()), known
+        off = tuple(path for path, value in known.items() if value == 0)
+        key = off, tuple(wanted)
+        if key not in self.reduced:  # building modules costs more than running them
+            model = self.model.across(()).active(known, wanted)
+            self.reduced[key] = model, tuple(model.declared)
+        model, paths = self.reduced[key]
+        return model, {path: known[path] for path in paths}
 
     def _cut(self, name: str, padded_series: Array) -> Array:
         """Without padding; on the host where possible, as a slice on the device is compiled for each length."""
