@@ -1,0 +1,114 @@
+"""The source's manual identification made automatic: scale the compression curve by the ratio of forces, and repeat.
+
+The tissue's nominal stress T in uniaxial compression is multiplied, strain by strain, by measured over simulated force,
+T_a = T F_e / F_s, where a depth d of the probe stands for the compression stretch 1 - d / h of a column as high as the
+tissue is thick; the energy is fitted to T_a, checked for stability, and the probing simulated again (Lister 2012,
+2.2.5). Kept for comparison: it needs no derivative, uses one number a depth and no marker.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from tissuejax.errors import UnstableSimulation
+from tissuejax.experiments.predictor import predictor
+from tissuejax.experiments.probing_predictor import ProbingPredictor
+from tissuejax.fitting.least_squares import descend
+from tissuejax.fitting.setup import problem
+from tissuejax.fitting.stability import recorded_stability
+from tissuejax.model import Model
+from tissuejax.recordings.recording import Channel, Recording, Sample
+
+LEAST = 0.02  # share of the greatest force below which a ratio of forces is noise
+CAP = 8.0  # largest factor on the stress in one iteration
+POINTS = 25
+
+
+@dataclass(frozen=True)
+class Turn:
+    """One iteration: values simulated, force and marker error, stability of the energy fitted next."""
+
+    values: dict[str, float]
+    force_rmse: float
+    marker_rmse: float | None
+    stable: bool
+
+
+def stress_curve(
+    probing: ProbingPredictor, name: str, start: Mapping[str, float], iterations: int = 4
+) -> tuple[dict[str, float], list[Turn]]:
+    """Values after some iterations on one recording, and how it went; the first turn is the start.
+
+    Args:
+        probing: predicts recording `name`.
+        name: the recording.
+        start: all values of the model; those of the energy are changed.
+        iterations: simulations after the first.
+    """
+    values = dict(start)
+    turns, best = [], dict(start)
+    for turn in range(iterations + 1):
+        try:
+            predicted = probing.predict(values)[name]
+        except UnstableSimulation:
+            turns.append(Turn(values, float("inf"), None, False))
+            values = {k: 0.5 * (values[k] + best[k]) for k in values}  # half-way back to the last that ran
+            continue
+        best = values
+        force, markers = errors(probing.sample.recordings[name], predicted)
+        stretch, factor = ratio(probing, name, predicted)
+        after, stable = refit(probing.model, values, stretch, factor) if turn < iterations else (values, True)
+        turns.append(Turn(values, force, markers, stable))
+        values = after
+    return best, turns
+
+
+def errors(measured: Recording, predicted: Recording) -> tuple[float, float | None]:
+    """Force RMSE (eq. 2.2), N, and marker RMSE (eq. 2.3), m: root mean square length of the error vectors."""
+
+    def rms(channel):
+        d = np.asarray(predicted.channels[channel].values, float) - np.asarray(measured.channels[channel].values, float)
+        return float(np.sqrt(np.nanmean(np.sum(d**2, axis=-1))))
+
+    return rms("force"), rms("markers") if "markers" in measured.channels else None
+
+
+def ratio(probing: ProbingPredictor, name: str, predicted: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """Compression stretch and measured over simulated force along the way down, stretch falling from 1."""
+    measured, setup = probing.sample.recordings[name], probing.setups[name]
+    channel = measured.channels["force"]
+    time = np.asarray(channel.time, float)
+    lowest = np.interp(time, np.asarray(setup.scene.probe.time), np.asarray(setup.scene.probe.position)[:, 2])
+    touch, bottom = float(setup.test.first_touch), int(lowest.argmin())
+    depth = np.interp(touch, time, lowest) - lowest
+    real, simulated = (np.asarray(c.values, float)[:, 2] for c in (channel, predicted.channels["force"]))
+    going = np.arange(len(time)) <= bottom
+    seen = going & (depth > 0) & (np.minimum(real, simulated) > LEAST * np.minimum(real.max(), simulated.max()))
+    grid = np.linspace(depth[seen].min(), depth[seen].max(), POINTS)
+    order = np.argsort(depth[seen])
+    smooth = [np.polyval(np.polyfit(depth[seen][order], f[seen][order], 4), grid) for f in (real, simulated)]
+    factor = np.clip(smooth[0] / np.maximum(smooth[1], 1e-9), 1 / CAP, CAP)
+    return 1 - grid / float(setup.test.height), factor
+
+
+def refit(
+    model: Model, values: Mapping[str, float], stretch: Float[np.ndarray, " n"], factor: Float[np.ndarray, " n"]
+) -> tuple[dict[str, float], bool]:
+    """The energy fitted to its own compression curve times `factor`, and whether it is stable there."""
+    order = np.argsort(-stretch)
+    stretch, factor = stretch[order], factor[order]
+    stretch = np.concatenate([[1.0], stretch])
+    alone = Model(model.energy)
+    time = np.arange(float(len(stretch)))
+    blank = Channel(time, np.zeros(len(time)), "Pa", 1.0)
+    test = Recording("curve", "uniaxial", {"time": time, "stretch": stretch}, {"nominal_stress": blank})
+    energy = {k: v for k, v in values.items() if k.startswith("energy.")}
+    curve = predictor(alone, Sample("curve", {"curve": test})).predict(energy)["curve"]
+    target = np.asarray(curve.channels["nominal_stress"].values, float) * np.concatenate([[factor[0]], factor])
+    noise = 0.01 * np.abs(target).max()
+    wanted = Recording("curve", "uniaxial", test.inputs, {"nominal_stress": Channel(time, target, "Pa", noise)})
+    posed = problem(predictor(alone, Sample("curve", {"curve": wanted})), start=energy, stable=True)
+    found = posed.values(descend(posed).y)
+    return dict(values) | found, recorded_stability(posed.predictor, found).stable
