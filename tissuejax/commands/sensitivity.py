@@ -153,7 +153,7 @@ def _fitted(given):
         model = verbs.material(
             energy["name"], ogden_form=form, volumetric=energy["volumetric"], effects=record["effects"]
         )
-    except (OSError, json.JSONDecodeError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{given.result}: not a result.json of `tissuejax fit` ({error})") from error
     sample = read(given.file)
     missing = [name for name in record["recordings"] if name not in sample.recordings]

@@ -1,0 +1,128 @@
+"""The command line: every command teaches, answers in JSON, and refuses with one sentence and exit code 2."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tissuejax.cli import commands, main
+
+ROOT = Path(__file__).parents[1]
+ELASTIC = str(ROOT / "data" / "demo" / "elastic.h5")
+YEOH = ["--energy", "reduced-polynomial-2"]
+
+
+def answer(capsys, *argv) -> tuple[int, dict]:
+    """Exit code and the JSON on standard output."""
+    code = main([*argv, "--json"])
+    return code, json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("name", sorted(commands()))
+def test_help_teaches(name, capsys):
+    with pytest.raises(SystemExit) as end:
+        main([name, "--help"])
+    text = capsys.readouterr().out
+    assert end.value.code == 0
+    assert f"tissuejax {name}" in text.split("positional")[0].split("options")[0], "no example"
+    assert "--json" in text
+
+
+def test_the_catalogue(capsys):
+    code, record = answer(capsys, "energies")
+    assert code == 0
+    assert {"neo-hookean", "ogden-N", "gent", "+fibre"} <= set(record["energies"])
+    assert all(e["formula"] and e["source"] and e["valid"] for e in record["energies"].values())
+    assert "in-vivo-3" in record["published"]
+
+
+def test_a_picture_of_an_energy(capsys, tmp_path):
+    code, record = answer(capsys, "energies", "--plot", "in-vivo-1", "--out", str(tmp_path))
+    assert code == 0
+    assert Path(record["files"]["energy"]).stat().st_size > 5000
+
+
+def test_inspect(capsys, tmp_path):
+    code, record = answer(capsys, "inspect", ELASTIC, "--out", str(tmp_path))
+    assert code == 0
+    tension = record["recordings"]["tension"]
+    assert tension["experiment"] == "uniaxial"
+    assert tension["channels"]["nominal_stress"]["noise_std"] == 8.0
+    assert tension["inputs"]["stretch"]["max"] == pytest.approx(1.35, abs=1e-3)
+    assert (tmp_path / "overview.png").exists()
+
+
+def test_fit_writes_everything(capsys, tmp_path):
+    argv = ["fit", ELASTIC, *YEOH, "--holdout", "holdout", "--out", str(tmp_path), "--multistart", "1"]
+    code, record = answer(capsys, *argv, "--start", "energy.C10=0.5 kPa", "--bounds", "energy.C20=0:2 kPa")
+    assert code == 0
+    assert record["parameters"]["energy.C10"]["value"] == pytest.approx(620, rel=0.01)
+    assert json.loads((tmp_path / "result.json").read_text())["status"] == "converged"
+    assert (tmp_path / "report.html").exists()
+    assert not list(tmp_path.glob(".*")), "a temporary file was left"
+
+
+def test_sensitivity_of_a_result_and_of_a_published_material(capsys, tmp_path):
+    out = str(tmp_path)
+    main(["fit", ELASTIC, *YEOH, "--only", "tension", "--out", out, "--multistart", "1"])
+    capsys.readouterr()
+    code, record = answer(
+        capsys, "sensitivity", ELASTIC, "--result", f"{out}/result.json", "--samples", "16", "--out", out
+    )
+    assert code == 0
+    assert set(record["local"]["values"]) == {"energy.C10", "energy.C20"}
+    code, record = answer(capsys, "sensitivity", "--published", "in-vivo-1", "--samples", "16", "--out", out)
+    assert code == 0
+    assert len(record["local"]["directions"]) == 4
+    assert (tmp_path / "fisher.png").exists()
+
+
+def test_not_converged_is_exit_code_3_and_still_writes(capsys, tmp_path):
+    argv = ["fit", ELASTIC, "--energy", "gent", "--max-steps", "2", "--multistart", "1", "--out", str(tmp_path)]
+    code, record = answer(capsys, *argv)
+    assert code == 3
+    assert record["status"].startswith("no convergence")
+    assert record["warnings"][0].startswith("Not converged")
+
+
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        (["fit", ELASTIC, "--energy", "neohookean"], "Did you mean 'neo-hookean'"),
+        (["fit", ELASTIC, "--energy", "ogden-2"], "need their form"),
+        (["fit", ELASTIC, "--energy", "reduced-polynomial"], "needs its order"),
+        (["fit", ELASTIC, *YEOH, "--fix", "energy.C11=3"], "Did you mean 'energy.C10'"),
+        (["fit", ELASTIC, *YEOH, "--fix", "energy.C10"], "PATH=VALUE"),
+        (["fit", ELASTIC, *YEOH, "--start", "energy.C10=3 mm"], "dimension"),
+        (["fit", ELASTIC, *YEOH, "--start", "energy.C10=-3"], "allowed is 0"),
+        (["fit", ELASTIC, *YEOH, "--bounds", "energy.C20=5:1"], "lower must be below upper"),
+        (["fit", ELASTIC, *YEOH, "--bounds", "energy.C20=5"], "PATH=A:B"),
+        (["fit", ELASTIC, *YEOH, "--holdout", "holdut"], "Did you mean 'holdout'"),
+        (["fit", ELASTIC, *YEOH, "--holdout", "holdout", "--holdout", "holdout"], "listed twice"),
+        (["fit", ELASTIC, *YEOH, "--only", "tension", "--holdout", "tension"], "at once"),
+        (["fit", ELASTIC, *YEOH, "--weights", "noise"], "choice of weights"),
+        (["fit", ELASTIC, *YEOH, "--loss", "l1"], "unknown loss"),
+        (["fit", ELASTIC, *YEOH, "--method", "newton"], "method"),
+        (["fit", ELASTIC, *YEOH, "--multistart", "0"], "1 or more"),
+        (["fit", "nowhere.h5", *YEOH], "no such file"),
+        (["inspect", str(ROOT / "LICENSE")], "another format"),
+        (["energies", "--plot", "gentle"], "Did you mean 'gent'"),
+        (["sensitivity"], "--published NAME"),
+        (["sensitivity", "--published", "in-vivo-9"], "Did you mean"),
+        (["sensitivity", ELASTIC, "--result", ELASTIC], "not a result.json"),
+        (["study", "nowhere"], "study.py"),
+    ],
+)
+def test_refusals_are_one_sentence_and_exit_code_2(argv, words, capsys):
+    code = main([*argv, "--json"])
+    out, err = capsys.readouterr()
+    assert code == 2
+    assert words in json.loads(out)["error"]
+    assert "Traceback" not in err
+
+
+def test_an_empty_file_is_refused(tmp_path, capsys):
+    empty = tmp_path / "empty.h5"
+    empty.touch()
+    assert main(["fit", str(empty), *YEOH]) == 2
+    assert "empty file" in capsys.readouterr().err
