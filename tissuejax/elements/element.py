@@ -55,6 +55,10 @@ class Element(eqx.Module):
     def forces(self, reference: Any, P: Tensor, memory: Any, stiffness: Float[Array, " E"]) -> Float[Array, "3 k E"]:
         """Nodal forces of the first Piola-Kirchhoff stress P (Pa) and of hourglass stiffness (Pa)."""
 
+    def hourglass_energy(self, reference: Any, memory: Any, stiffness: Float[Array, " E"]) -> Float[Array, ""] | float:
+        """Energy of the hourglass control, J."""
+        return 0.0
+
     @abc.abstractmethod
     def steepness(self, reference: Any, hourglass: float) -> Float[Array, " E"]:
         """Largest eigenvalue of sum_a B_a B_a^T times the number of nodes, 1/m^2, or that of the hourglass modes.

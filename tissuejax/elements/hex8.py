@@ -78,6 +78,9 @@ class Hex8(Element):
         g = barrier(sum(A[:, J][:, None] * T[:, J][None] for J in range(3)))
         return nodal(g, h)
 
+    def hourglass_energy(self, reference: Reference, memory: Any, stiffness: Float[Array, " E"]) -> Array:
+        return 0.5 * jnp.sum(reference.stiffening * stiffness * memory * memory)
+
     def steepness(self, reference: Reference, hourglass: float) -> Float[Array, " E"]:
         A = reference.gradient
         G = 64 * jnp.einsum("kie,kje->ije", A, A)  # nodes * sum_a B_a B_a^T

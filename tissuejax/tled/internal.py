@@ -212,11 +212,14 @@ def forces(scene: Scene, mesh: Mesh, u: Float[Array, "3 N"], history: History, s
 
 
 def internal_energy(scene: Scene, mesh: Mesh, u: Float[Array, "3 N"]):
-    """Elastic energy without memory and hourglass part, J, with the volume ratio of each element (E,)."""
-    F, _ = scene.body.element.gradient(mesh.reference, take(u, mesh.cells))
+    """Elastic energy without memory, J, the volume ratio of each element (E,), and the hourglass energy, J."""
+    element = scene.body.element
+    F, memory = element.gradient(mesh.reference, take(u, mesh.cells))
+    shear = scene.settings.hourglass * scene.tissue.energy.initial_shear_modulus(scene.tissue.energy_values)
+    hourglass = jnp.asarray(element.hourglass_energy(mesh.reference, memory, shear * mesh.stiffness), u.dtype)
     J = determinant(F)
     V = mesh.reference.volume
     if scene.body.element.averaged_pressure:
         psi = mesh.stiffness * _isochoric_energy(scene, Strain.of(cauchy_green(F)))
-        return jnp.sum(V * psi) + jnp.sum(mesh.nodal_volume * averaged_pressure(scene, mesh, F)[1]), J
-    return jnp.sum(V * mesh.stiffness * energy_density(scene, cauchy_green(F))), J
+        return jnp.sum(V * psi) + jnp.sum(mesh.nodal_volume * averaged_pressure(scene, mesh, F)[1]), J, hourglass
+    return jnp.sum(V * mesh.stiffness * energy_density(scene, cauchy_green(F))), J, hourglass

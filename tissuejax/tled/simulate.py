@@ -35,13 +35,15 @@ class Checks(NamedTuple):
     """Taken at the end of each block of frames.
 
     Attributes:
-        kinetic, internal: energies, J (internal: elastic, without memory and hourglass part).
+        kinetic, internal: energies, J (kinetic with the static mass of contact; internal: elastic, no memory).
+        hourglass: energy of the hourglass control, J; more than some per cent of `internal`: too coarse.
         depth: greatest penetration into the probe, m.
         failed: True where a value is not finite or an element is inverted; `element`: the worst one.
     """
 
     kinetic: Float[Array, " b"]
     internal: Float[Array, " b"]
+    hourglass: Float[Array, " b"]
     depth: Float[Array, " b"]
     failed: Array
     element: Int[Array, " b"]
@@ -170,15 +172,15 @@ def _markers(scene, u):
 def _checks(m: Machine, state: State, centre) -> Checks:
     u, v = jax.lax.stop_gradient((state.u, state.v))
     frozen = jax.lax.stop_gradient(m)
-    energy, J = internal.internal_energy(frozen.scene, frozen.mesh, u)
-    kinetic = 0.5 * jnp.sum(frozen.mesh.mass * v * v)
+    energy, J, hourglass = internal.internal_energy(frozen.scene, frozen.mesh, u)
+    kinetic = 0.5 * jnp.sum(frozen.mass * v * v)
     J = jnp.where(jnp.isfinite(J), J, -jnp.inf)[: len(frozen.scene.body.cells)]
     worst = jnp.argmin(J)
     failed = (J[worst] <= 0) | ~jnp.isfinite(jnp.sum(v))
     deep = jnp.asarray(-jnp.inf, u.dtype)
     if centre is not None:
         deep = contact.depth(frozen.scene.probe, frozen.patch, u, jax.lax.stop_gradient(centre))
-    return Checks(kinetic, energy, deep, failed, worst)
+    return Checks(kinetic, energy, hourglass, deep, failed, worst)
 
 
 def _outcome(scene, felt, markers, checks, length, state) -> Outcome:

@@ -1,0 +1,115 @@
+"""The explicit step: momentum, energy, order of convergence, refusals, and long runs that stop and go on."""
+
+from xml.etree import ElementTree
+
+import h5py
+import jax.numpy as jnp
+import meshio
+import numpy as np
+import pytest
+
+from tests.tled import cases
+from tissuejax.errors import InputError, UnstableSimulation
+from tissuejax.mesh.columns import box
+from tissuejax.tled import contact, stream
+from tissuejax.tled.simulate import compiled, run
+from tissuejax.tled.step import machine
+
+FRAMES = 36  # a square: no frames beyond the last are run
+
+
+@pytest.fixture(scope="module")
+def pressed():
+    """A frictionless press without damping, and what came out."""
+    scene = cases.pressed(frames=FRAMES, mass_damping=0.0, compression=10.0).put({"clock.steps": 8})
+    return scene, run(scene)
+
+
+def test_force_on_probe_and_support_agree_to_the_change_of_momentum(pressed):
+    """force + reaction = - d(momentum)/dt, exactly so in central differences: the impulse of the whole run is the
+    momentum of the free nodes at its end (of the contact's static mass too)."""
+    scene, out = pressed
+    free = np.ones(len(scene.body.points))
+    free[np.asarray(scene.body.fixed)] = 0.0
+    mass = np.asarray(machine(scene).mass) * free
+    impulse = np.asarray(out.force + out.reaction).sum(0) * float(scene.clock.interval / scene.clock.compression)
+    momentum = np.asarray(out.state.v) @ mass
+    assert np.allclose(impulse, -momentum, atol=1e-9 * np.abs(np.asarray(out.force)).sum())
+
+
+def test_the_work_of_the_probe_is_found_again_as_energy(pressed):
+    """Kinetic, strain, hourglass and penalty energy at the end = work of the probe, to 0.3 % (0.02 % at half the step:
+    the velocity is half a step behind)."""
+    scene, out = pressed
+    end = jnp.stack([jnp.interp(out.end_time[-1], scene.probe.time, scene.probe.position[:, i]) for i in range(3)])
+    penalty = contact.energy(scene.probe, contact.patch(scene), out.state.u, end)
+    stored = float(out.checks.kinetic[-1] + out.checks.internal[-1] + out.checks.hourglass[-1] + penalty)
+    assert abs(stored / float(out.work[-1]) - 1) < 3e-3
+    assert float(out.depth) < 0.02 * cases.RADIUS
+
+
+def test_a_free_fall_of_the_whole_body_is_exact():
+    """No node is held: u = g t^2 / 2 in central differences, and the momentum is m g t."""
+    g = box((0.02, 0.02, 0.02), (2, 2, 2))
+    times = np.arange(1, 21) * 1e-3
+    held = np.zeros((len(g.fixed), 3))
+    out = run(cases.plain(g, times, gravity=(0, 0, -9.81), held=held, mass_damping=0.0))
+    t = float(out.end_time[-1]) - float(out.end_time[0]) + 1e-3
+    assert np.allclose(out.state.u[2], -9.81 * t**2 / 2, rtol=1e-9)
+    assert np.allclose(out.state.u[:2], 0, atol=1e-15)
+
+
+def test_second_order_in_the_step():
+    """Gravity switched on: the top's displacement after a while, steps h, h/2, h/4 (source 4.3.3 at small size)."""
+    g = box((0.05, 0.05, 0.05), (2, 2, 2))
+    times = np.arange(1, 11) * 2e-3
+
+    def top(steps):
+        scene = cases.plain(g, times, gravity=(0, 0, -9.81)).put({"clock.steps": steps})
+        return float(run(scene).state.u[2].min())
+
+    a, b, c = (top(n) for n in (4, 8, 16))
+    assert 3.3 < (a - b) / (b - c) < 4.7
+
+
+def test_a_step_above_the_critical_one_is_refused_and_one_forced_in_is_caught():
+    g = box((0.02, 0.02, 0.02), (3, 3, 3))
+    times = np.arange(1, 9) * 0.02
+    with pytest.raises(InputError, match="critical step"):
+        cases.plain(g, times, step=0.01)
+    wild = cases.plain(g, times, gravity=(0, 0, -9.81)).put({"clock.steps": 5})
+    with pytest.raises(UnstableSimulation, match=r"broke down by t = .* element \d+"):
+        run(wild)
+
+
+def test_a_probe_that_starts_inside_or_stays_away_is_refused():
+    g = box((0.03, 0.03, 0.012), (5, 5, 3))
+    t = np.arange(3.0)
+    options = dict(probe_time=t, radius=0.006)
+    with pytest.raises(InputError, match="inside the tissue"):
+        cases.plain(g, t, probe_position=np.tile([0, 0, 0.015], (3, 1)), **options)
+    with pytest.raises(InputError, match="off the tissue"):
+        cases.plain(g, t, probe_position=np.tile([0, 0, 0.2], (3, 1)), **options)
+    with pytest.raises(InputError, match="radius"):
+        cases.plain(g, t, probe_time=t, probe_position=np.tile([0, 0, 0.2], (3, 1)))
+
+
+def test_a_run_that_is_stopped_goes_on_bit_for_bit(tmp_path):
+    scene = cases.pressed(frames=3 * stream.CHUNK).put({"probe.friction": jnp.asarray(0.2)})
+    stream.run_to_file(scene, tmp_path / "whole.h5")
+    stream.run_to_file(scene, tmp_path / "parts.h5", chunks=1)
+    stream.run_to_file(scene, tmp_path / "parts.h5")
+    with h5py.File(tmp_path / "whole.h5") as a, h5py.File(tmp_path / "parts.h5") as b:
+        for name in ("channels/force", "channels/reaction", "states/displacement/2"):
+            assert np.array_equal(a[name], b[name])
+        assert len(a["channels/force"]) == scene.clock.frames
+        assert np.abs(a["channels/force"][...] - np.asarray(compiled(scene).force)).max() < 1e-9
+        last = a["states/displacement/2"][...]
+    mesh = meshio.read(stream.to_vtu(tmp_path / "whole.h5", tmp_path / "last.vtu"))
+    assert np.allclose(mesh.points, scene.body.points)
+    assert np.allclose(mesh.point_data["displacement"], last)
+    tree = ElementTree.parse(stream.to_xdmf(tmp_path / "whole.h5", tmp_path / "whole.xdmf"))
+    with h5py.File(tmp_path / "whole.h5") as file:
+        for item in tree.iter("DataItem"):
+            assert file[item.text.split(":")[1]].shape == tuple(map(int, item.get("Dimensions").split()))
+    assert [float(t.get("Value")) for t in tree.iter("Time")] == pytest.approx([0.5 / 3, 1.0 / 3, 0.5])

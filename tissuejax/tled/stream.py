@@ -1,0 +1,142 @@
+"""Long runs in chunks: watched while they run, written as they go, stopped and resumed bit for bit.
+
+A run is cut into chunks of `CHUNK` frames. After each one the failure check is looked at, channels and state are
+appended to one HDF5 file, and progress is told. A run that was stopped goes on from the last chunk in the file, and
+because a run that was not stopped passes through the same chunks, both give the same bits. `to_xdmf` and `to_vtu`
+make the stored states readable in ParaView.
+"""
+
+from pathlib import Path
+
+import h5py
+import jax
+import jax.numpy as jnp
+import meshio
+import numpy as np
+
+from tissuejax.errors import InputError
+from tissuejax.progress import Progress, Silent
+from tissuejax.tled.scene import Scene
+from tissuejax.tled.simulate import COMPILER_OPTIONS, Outcome, check, proceed
+from tissuejax.tled.step import State, machine, start
+
+CHUNK = 64
+SILENT = Silent()
+CHANNELS = ("time", "end_time", "force", "torque", "reaction", "work", "markers")
+
+
+@jax.jit
+def _rest(scene: Scene) -> State:
+    return start(machine(scene))
+
+
+def _go_on(scene: Scene, state: State) -> Outcome:
+    return proceed(machine(scene), state)
+
+
+_chunk = jax.jit(_go_on, compiler_options=COMPILER_OPTIONS)
+
+
+def run_to_file(scene: Scene, path: str | Path, progress: Progress = SILENT, chunks: int | None = None) -> Path:
+    """Simulate a scene chunk by chunk into an HDF5 file; go on where the file ends.
+
+    Args:
+        scene: frames are rounded up to whole chunks.
+        path: `/channels/*` grow by frames, `/states/displacement/K` (N, 3) after chunk K, `/resume` holds the last state.
+        progress: told after each chunk.
+        chunks: stop after so many (None: to the end).
+
+    Raises:
+        UnstableSimulation: with the file holding all that was computed before.
+        InputError: a file that belongs to another scene.
+    """
+    path, scene = Path(path), scene.cast(scene.body.points.dtype)
+    total = -(-scene.clock.frames // CHUNK)
+    work = scene.put({"clock.frames": CHUNK})
+    state = _rest(scene)
+    with h5py.File(path, "a") as file:
+        done = int(file.attrs.get("chunks", 0))
+        if done:
+            state = _load(file, state, path)
+        else:
+            file["points"], file["cells"] = np.asarray(scene.body.points), np.asarray(scene.body.cells)
+            file.attrs["cell_type"] = scene.body.element.name
+        stop = total if chunks is None else min(total, done + chunks)
+        with progress.stage("simulating", total=stop - done) as stage:
+            for k in range(done, stop):
+                part = work.put({"clock.start": scene.clock.start + scene.clock.interval * (k * CHUNK)})
+                out = _chunk(part, state)
+                check(out, part)
+                state = out.state
+                for name in CHANNELS:
+                    if getattr(out, name) is not None:
+                        _append(file, f"channels/{name}", getattr(out, name))
+                file[f"states/displacement/{k}"] = np.asarray(state.u.T)
+                _append(file, "states/time", jnp.atleast_1d(out.end_time[-1]))
+                _save(file, state)
+                file.attrs["chunks"] = k + 1
+                file.flush()
+                stage.advance(note=f"t = {float(out.end_time[-1]):.3g} s")
+    return path
+
+
+def _append(file: h5py.File, name: str, values) -> None:
+    values = np.asarray(values)
+    if name not in file:
+        file.create_dataset(name, data=values, maxshape=(None, *values.shape[1:]), chunks=True)
+        return
+    old = len(file[name])
+    file[name].resize(old + len(values), axis=0)
+    file[name][old:] = values
+
+
+def _save(file: h5py.File, state: State) -> None:
+    for i, leaf in enumerate(jax.tree.leaves(state)):
+        name = f"resume/{i}"
+        if name in file:
+            file[name][...] = np.asarray(leaf)
+        else:
+            file[name] = np.asarray(leaf)
+
+
+def _load(file: h5py.File, like: State, path: Path) -> State:
+    leaves, tree = jax.tree.flatten(like)
+    stored = [file[f"resume/{i}"][...] for i in range(len(file["resume"]))]
+    if [s.shape for s in stored] != [leaf.shape for leaf in leaves]:
+        raise InputError(f"{path} holds the run of another scene (states of other shapes); give a new file name")
+    return jax.tree.unflatten(tree, [jnp.asarray(s) for s in stored])
+
+
+def to_xdmf(path: str | Path, target: str | Path) -> Path:
+    """The stored states as an XDMF time series for ParaView: a small text that points into the HDF5 file."""
+    path, target = Path(path), Path(target)
+    with h5py.File(path) as file:
+        times, kind = file["states/time"][...], file.attrs["cell_type"].capitalize().replace("Tetra", "Tetrahedron")
+        points, cells = file["points"].shape, file["cells"].shape
+
+    def item(name, shape, number):
+        size = " ".join(map(str, shape))
+        return f'<DataItem Dimensions="{size}" NumberType="{number}" Format="HDF">{path.name}:/{name}</DataItem>'
+
+    grids = "".join(
+        f'<Grid><Time Value="{t:.9g}"/>'
+        f'<Topology TopologyType="{kind}" NumberOfElements="{cells[0]}">{item("cells", cells, "Int")}</Topology>'
+        f'<Geometry GeometryType="XYZ">{item("points", points, "Float")}</Geometry>'
+        f'<Attribute Name="displacement" AttributeType="Vector" Center="Node">'
+        f"{item(f'states/displacement/{k}', points, 'Float')}</Attribute></Grid>"
+        for k, t in enumerate(times)
+    )
+    target.write_text(
+        f'<Xdmf Version="3.0"><Domain><Grid GridType="Collection" CollectionType="Temporal">{grids}</Grid></Domain></Xdmf>'
+    )
+    return target
+
+
+def to_vtu(path: str | Path, target: str | Path, index: int = -1) -> Path:
+    """One stored state as a mesh file (VTU or whatever meshio makes of the suffix), displacement as point data."""
+    with h5py.File(path) as file:
+        states = file["states/displacement"]
+        k = range(len(states))[index]
+        cells = [(file.attrs["cell_type"], file["cells"][...])]
+        meshio.Mesh(file["points"][...], cells, {"displacement": states[str(k)][...]}).write(target)
+    return Path(target)
