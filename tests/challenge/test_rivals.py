@@ -1,0 +1,61 @@
+"""Rivals read off a result, and the Gaussian process, on answers and data made by hand."""
+
+import numpy as np
+import pytest
+
+from tissuejax.challenge import files, rivals
+from tissuejax.challenge.material_cases import draw
+
+RESULT = {
+    "candidates": [
+        {
+            "name": "slack",
+            "score": 50.0,
+            "refit_chi2_per_sample": 2.0,
+            "criterion": -90.0,
+            "held_out_chi2_per_sample": 1.5,
+        },
+        {
+            "name": "aging",
+            "score": 80.0,
+            "refit_chi2_per_sample": 2.5,
+            "criterion": -40.0,
+            "held_out_chi2_per_sample": 9.0,
+        },
+        {
+            "name": "drift",
+            "score": 5.0,
+            "refit_chi2_per_sample": 3.0,
+            "criterion": 3.0,
+            "held_out_chi2_per_sample": 1.2,
+        },
+    ],
+    "sets": [{"effects": ["slack", "drift"], "criterion": 0.0}, {"effects": ["aging"], "criterion": 50.0}],
+    "before": {"r4": {"nominal_stress": {"chi2_per_sample": 4.0, "role": "held out"}}},
+}
+
+
+def test_each_criterion_names_its_own_favourite():
+    assert rivals.named_by_score(RESULT) == ("aging",)
+    assert rivals.named_by_refit(RESULT) == ("slack",)
+    assert rivals.named_by_hold_out(RESULT) == ("drift",)
+    assert rivals.named_by_all_subsets(RESULT) == ("slack", "drift")
+
+
+def test_nothing_to_name():
+    quiet = {"candidates": [], "sets": [], "before": {}}
+    assert rivals.named_by_score(quiet) == rivals.named_by_refit(quiet) == rivals.named_by_hold_out(quiet) == ()
+
+
+def test_gaussian_process_learns_a_drift(tmp_path):
+    case = draw("x", 2, 0, "one", 7)
+    assert case.key["effects"] == ["drift"]
+    files.write_material(case, tmp_path / "x.h5")
+    found = rivals.discrepancy(tmp_path / "x.h5", case.energy, most=150)
+    size = case.key["size_over_noise"]["drift"]
+    assert found.fitted < 0.5 * (1 + size**2) + 0.6
+    assert np.isfinite(found.held_out)
+    trials, stress, noise = rivals.trials_of(tmp_path / "x.h5")
+    assert noise == pytest.approx(case.noise)
+    assert np.array_equal(stress["r1"], case.stress["r1"])
+    assert [t.name for t in trials] == [t.name for t in case.trials]

@@ -1,0 +1,66 @@
+"""`tissuejax challenge`: make sealed cases, run the diagnosis over them, open the keys and grade."""
+
+import argparse
+from pathlib import Path
+from typing import ClassVar
+
+from tissuejax.challenge.grade import grade
+from tissuejax.challenge.make import KINDS, make
+from tissuejax.challenge.run import run
+from tissuejax.commands.command import Command, Reply
+from tissuejax.progress import for_terminal
+from tissuejax.report.challenge_table import figures
+
+
+class ChallengeCommand(Command):
+    """Make, run and grade a challenge of the diagnosis."""
+
+    name: ClassVar[str] = "challenge"
+    order: ClassVar[int] = 80
+    summary: ClassVar[str] = "measure the diagnosis on sealed cases from a simulator of its own"
+    teaches: ClassVar[str] = """
+Measure the diagnosis like a medical test. `make` draws cases from a seed (material tests from closed forms, probing by
+an implicit finite-element solver; neither shares code with the diagnosis), writes the recordings, seals the truth in a
+file of its own and keeps that file's hash. `run` diagnoses case by case and goes on where it was interrupted. `grade`
+checks the hash, opens the truth and writes graded.csv, confusion.csv, by_size.csv, graded.json and two figures.
+
+  tissuejax challenge make out/challenge --kind material --count 210 --seed 7
+  tissuejax challenge run out/challenge --jobs 2
+  tissuejax challenge grade out/challenge --out fits/challenge/material
+"""
+
+    def arguments(self, parser: argparse.ArgumentParser) -> None:
+        """What to do, the challenge's folder, and the options of each."""
+        parser.add_argument("action", choices=("make", "run", "grade"), help="what to do")
+        parser.add_argument("folder", type=Path, metavar="FOLDER", help="the challenge")
+        parser.add_argument(
+            "--kind", choices=KINDS, default="material", help="make: material tests (default) or probing"
+        )
+        parser.add_argument("--count", type=int, default=200, metavar="N", help="make: number of cases (default 200)")
+        parser.add_argument("--seed", type=int, default=1, help="make: the same seed gives the same cases (default 1)")
+        parser.add_argument("--jobs", "-j", type=int, default=1, metavar="N", help="make, run: processes (default 1)")
+        parser.add_argument("--case", action="append", default=[], metavar="NAME", help="run: only this case (repeat)")
+        parser.add_argument("--again", action="store_true", help="run: diagnose again what has a result")
+        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="grade: where to write (default: FOLDER)")
+
+    def run(self, given: argparse.Namespace) -> Reply:
+        """Do one of the three."""
+        if given.action == "make":
+            made = make(given.folder, given.kind, given.count, given.seed, given.jobs, for_terminal())
+            text = (
+                f"{len(made['cases'])} {given.kind} cases in {given.folder}\nkeys sealed, sha256 {made['keys_sha256']}"
+            )
+            return Reply(made, text)
+        if given.action == "run":
+            results = run(given.folder, given.jobs, tuple(given.case), given.again, for_terminal())
+            record = {name: str(path) for name, path in results.items()}
+            return Reply(
+                {"results": record}, f"{len(results)} cases answered; next: tissuejax challenge grade {given.folder}"
+            )
+        found = grade(given.folder, given.out)
+        figures(found, given.out or given.folder)
+        lines = [f"{found['answered']} of {found['cases']} cases answered", ""]
+        for name, r in found["rates"].items():
+            if r["of"]:
+                lines.append(f"  {name:<58}{r['share']:>6.0%}  ({r['low']:.0%} to {r['high']:.0%}, n = {r['of']})")
+        return Reply(found, "\n".join(lines))
