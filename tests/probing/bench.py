@@ -11,7 +11,7 @@ from tissuejax.recordings.recording import Channel, Recording, Sample
 SIZE = (0.04, 0.036, 0.015)
 BODY = box(SIZE, (8, 8, 3))
 VALUES = {"energy.C10": 500.0, "energy.C20": 300.0, "volumetric.K": 10e3}
-QUICK = ProbingSettings(mesh="file", compression=3.0, interval=0.04, step=8e-4, stiffness_damping=1e-4, threads=1)
+QUICK = ProbingSettings(mesh="file", compression=3.0, interval=0.04, step=8e-4, stiffness_damping=1e-4, processes=1)
 MARKERS = np.array([[0.012, 0.003, 0.015], [-0.007, 0.011, 0.015], [0.001, -0.012, 0.015]])
 
 

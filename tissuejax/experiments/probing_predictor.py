@@ -6,7 +6,6 @@ finite is refused with the time and the element, never masked.
 """
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import ClassVar
 
 import equinox as eqx
@@ -17,7 +16,7 @@ from jaxtyping import Array, Float
 
 from tissuejax.cache import keep_programs
 from tissuejax.errors import UnstableSimulation, unknown
-from tissuejax.experiments import programs
+from tissuejax.experiments import programs, workers
 from tissuejax.experiments.homogeneous import local
 from tissuejax.experiments.predictor import Predictor, Tangents
 from tissuejax.experiments.probing import Simulated, simulated
@@ -81,7 +80,7 @@ class ProbingPredictor(Predictor):
         """The simulations behind `predict`, with their checks."""
         bare = self.model.across(())
         thetas = {name: _vector(local(self.model, values, name)) for name in self.names}
-        jobs = [lambda n=name: programs.run(_predict, bare, thetas[n], self.setups[n]) for name in self.names]
+        jobs = [(_predict, bare, thetas[name], self.setups[name]) for name in self.names]
         out = dict(zip(self.names, self._side_by_side(jobs, thetas), strict=True))
         for name, run in out.items():
             self._refuse_failed(name, run)
@@ -102,7 +101,7 @@ class ProbingPredictor(Predictor):
                 basis[i] = [path in self.model.source_of(generic, name) for generic in declared]
             felt = np.flatnonzero(basis.any(1))
             for part in _parts(felt, self.settings.tangents):
-                jobs.append(lambda n=name, b=basis[part]: programs.run(_linearised, bare, thetas[n], self.setups[n], b))
+                jobs.append((_linearised, bare, thetas[name], self.setups[name], basis[part]))
                 place.append((name, part))
         recordings, tangents = {}, {path: {} for path in paths}
         for (name, part), (run, slopes) in zip(place, self._side_by_side(jobs, thetas), strict=True):
@@ -119,13 +118,10 @@ class ProbingPredictor(Predictor):
         return recordings, tangents
 
     def _side_by_side(self, jobs: list, thetas: Mapping[str, Array]) -> list:
-        """Run the jobs on as many threads as the settings say; in order and alone where values are traced."""
+        """Run the jobs on as many processes as the settings say; in order and here where values are traced."""
         if any(isinstance(t, jax.core.Tracer) for t in thetas.values()):
-            return [job() for job in jobs]
-        if self.settings.threads == 1 or len(jobs) == 1 or not programs.PARALLEL:
-            return [jax.device_get(job()) for job in jobs]
-        with ThreadPoolExecutor(self.settings.threads) as pool:
-            return list(pool.map(lambda job: jax.device_get(job()), jobs))
+            return [programs.run(*job) for job in jobs]
+        return workers.run_all(jobs, self.settings.processes)
 
     def _refuse_failed(self, name: str, run: Simulated) -> None:
         if isinstance(run.failed, jax.core.Tracer):

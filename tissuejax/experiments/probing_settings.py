@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from tissuejax.errors import InputError, unknown
 
 MESHES = ("graded", "file")
+REFINED = 1.35
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class ProbingSettings:
         margin: the contact patch reaches this far beyond the probe's radius and path, m.
         nearest_node: markers on the nearest node instead of their place in a facet.
         precision: "float32" or "float64".
-        threads: recordings simulated side by side.
+        processes: that simulate recordings side by side; 1 stays in this process.
         tangents: columns of the Jacobian per program.
     """
 
@@ -50,7 +51,7 @@ class ProbingSettings:
     margin: float = 0.006
     nearest_node: bool = False
     precision: str = "float32"
-    threads: int = 1
+    processes: int = 2
     tangents: int = 3
 
     def __post_init__(self):
@@ -58,7 +59,7 @@ class ProbingSettings:
             raise unknown("mesh choice", self.mesh, MESHES)
         if self.precision not in ("float32", "float64"):
             raise unknown("precision", self.precision, ("float32", "float64"))
-        for name in ("compression", "interval", "step", "penalty", "softness", "threads", "tangents"):
+        for name in ("compression", "interval", "step", "penalty", "softness", "processes", "tangents"):
             if not getattr(self, name) > 0:
                 raise InputError(f"probing setting {name} = {getattr(self, name)}: it must be positive")
 
@@ -84,11 +85,15 @@ class ProbingSettings:
         return self.changed(compression=2 * self.compression)
 
     @property
+    def finer(self) -> "ProbingSettings":
+        """Elements smaller by a factor of about 1.35 (`REFINED`), the last step of a fit."""
+        return self.changed(mesh="graded", counts=tuple(round(REFINED * n) for n in self.counts))
+
+    @property
     def varied(self) -> dict[str, "ProbingSettings"]:
         """The settings whose effect on the prediction makes up the numerical error: mesh, speed and step, penalty."""
-        finer = tuple(round(1.35 * n) for n in self.counts)
         return {
-            "mesh": self.changed(mesh="graded", counts=finer),
+            "mesh": self.finer,
             "step": self.changed(compression=0.5 * self.compression),
             "penalty": self.changed(penalty=2.0 * self.penalty),
         }

@@ -1,7 +1,8 @@
 """Fit of probings: few simulations, coarse derivatives under fine residuals, and errors that include the numerical one.
 
 The derivatives come from a run twice as fast (half the steps), the residuals from the run that counts: Gauss-Newton
-needs no better direction, and a Jacobian costs five forward runs. Standard errors hold two parts: noise, and how far
+needs no better direction, and a Jacobian costs five forward runs. The end is a step on a finer mesh with the last
+derivatives. Standard errors hold two parts: noise, and how far
 the estimate moves when mesh, step and penalty are changed (a linear shift: the change of the prediction through the
 Jacobian).
 """
@@ -18,6 +19,7 @@ from jaxtyping import Float
 from tissuejax import storage
 from tissuejax.errors import InputError
 from tissuejax.experiments.probing_predictor import ProbingPredictor
+from tissuejax.experiments.probing_settings import REFINED
 from tissuejax.fitting.advice import warnings_of
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.result import Fit, Iterate
@@ -28,6 +30,9 @@ from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
 from tissuejax.progress import Progress, Silent
 
 METHOD = "sparing"
+# what is left to the limit, over the change just seen: the mesh error falls with h^2 and the final mesh is the finer one;
+# inertia with the compression squared, from f to f/2; the error of a penalty with its inverse, doubled
+REMAINS = {"mesh": 1 / (REFINED**2 - 1), "step": 4 / 3, "penalty": 2.0}
 
 
 @dataclass(frozen=True)
@@ -36,8 +41,8 @@ class ProbedFit:
 
     Attributes:
         fit: the result; its standard errors include the numerical part.
-        shifts: for each numerical choice changed ("mesh", "step", "penalty"), the shift of each free parameter.
-        numerical: root mean square change of each "recording/channel" by all changes together, SI.
+        shifts: for each numerical choice ("mesh", "step", "penalty"), how far it holds each free parameter off its limit.
+        numerical: root mean square numerical error of each "recording/channel", SI.
         noise_std: standard errors from noise alone.
         simulations: forward runs and Jacobians spent, a run being one recording set.
     """
@@ -61,6 +66,7 @@ def fit_probed(
     *,
     holdout: tuple[str, ...] = (),
     numerical: bool = True,
+    finish: bool = True,
     checkpoint: Path | None = None,
     max_steps: int = 12,
     fraction: float = 0.1,
@@ -73,6 +79,7 @@ def fit_probed(
         problem: predictor, free parameters, start, noise, bounds, priors.
         holdout: recordings of the same sample to predict and score only.
         numerical: estimate the numerical error (three more forward runs).
+        finish: move to the finer mesh at the end (two more forward runs there); needs a graded mesh.
         checkpoint: a file that keeps the last accepted values; a fit of the same problem goes on from there.
         max_steps: Jacobians at most.
         fraction: converged once the next step is shorter than this many standard errors.
@@ -114,12 +121,20 @@ def fit_probed(
         y = box.free(problem.vector(start))
         descent, r, J = sparing(jacobian, residuals, y, max_steps=max_steps, fraction=fraction, on_accept=accepted)
         x, slope = box.bounded(descent.y)
-        values, J = problem.values(x), J / slope
+        J, cost = J / slope, descent.cost
+        kept.keep(problem.values(x))
+        stage.advance(note="numerical error")
+        shifts, sizes = numerical_shifts(problem, problem.values(x), r, J) if numerical else ({}, {})
+        if finish:
+            stage.advance(note="finer mesh")
+            problem, x, r = finished(problem, x, J)
+            cost = 0.5 * float(r @ r)
+            spent["forward"] += 2
+        final, values = problem.predictor, problem.values(x)
         kept.keep(values)
-        fitted = dict(fine.predict(values))
+        fitted = dict(final.predict(values))
         stage.advance(note="held out")
-        held = dict(fine.of(holdout).predict(values)) if holdout else {}
-        shifts, sizes = numerical_shifts(problem, values, fitted, J) if numerical else ({}, {})
+        held = dict(final.of(holdout).predict(values)) if holdout else {}
     noise_part = _noise_part(problem, x, J, r)
     spread = _with_shifts(noise_part, [np.array(list(s.values())) for s in shifts.values()])
     measured = fine.sample.recordings
@@ -133,13 +148,13 @@ def fit_probed(
         values=values,
         uncertainty=spread,
         at_bound={p: side for p, side in zip(problem.free, box.at_bound(x), strict=True) if side},
-        chi2=2 * descent.cost,
+        chi2=2 * cost,
         channels=scores(measured, fitted, std),
         holdout=scores(measured, held, std),
         predictions=fitted | held,
         trace=[Iterate(i, 2 * c, problem.values(box.bounded(y)[0])) for i, (c, y) in enumerate(descent.trace, 1)],
-        stability=recorded_stability(fine, values),
-        starts=[2 * descent.cost],
+        stability=recorded_stability(final, values),
+        starts=[2 * cost],
         n_evaluations=descent.n_evaluations,
         seconds=time.perf_counter() - begun,
         method=METHOD,
@@ -150,30 +165,43 @@ def fit_probed(
     return ProbedFit(found, shifts, sizes, noise_std, spent)
 
 
-def numerical_shifts(
-    problem: Problem, values: Mapping[str, float], predicted: Mapping, jacobian: Float[np.ndarray, "n p"]
-) -> tuple[dict[str, dict[str, float]], dict[str, float]]:
-    """How far the estimate would move on another mesh, step and penalty, and how far the prediction moves.
+def finished(problem: Problem, x: Float[np.ndarray, " p"], jacobian: Float[np.ndarray, "n p"]):
+    """The problem on the finer mesh, the estimate after one step there with given derivatives, and its residuals."""
+    settings = problem.predictor.settings
+    finer = replace(problem, predictor=problem.predictor.with_settings(settings.finer))
+    before = finer.residuals(finer.values(x))
+    step = x - np.linalg.lstsq(jacobian, before, rcond=None)[0]
+    lower, upper = (np.array(v) for v in zip(*(problem.bound(path) for path in problem.free), strict=True))
+    step = np.clip(step, lower, upper)
+    after = finer.residuals(finer.values(step))
+    return (finer, step, after) if after @ after < before @ before else (finer, x, before)
 
-    Data that stay while the prediction changes by d move the estimate by -(J'J)^-1 J'd.
+
+def numerical_shifts(
+    problem: Problem,
+    values: Mapping[str, float],
+    residuals: Float[np.ndarray, " n"],
+    jacobian: Float[np.ndarray, "n p"],
+) -> tuple[dict[str, dict[str, float]], dict[str, float]]:
+    """How far mesh, step and penalty hold the estimate off its limit, and how far the prediction moves.
+
+    Data that stay while the prediction changes by d move the estimate by -(J'J)^-1 J'd. From the change to the next
+    setting the distance to the limit follows by the order of convergence (`REMAINS`).
 
     Args:
         problem: with the predictor whose settings are varied.
         values: the estimate.
-        predicted: its prediction by recording.
+        residuals: there.
         jacobian: of the residuals to the free parameters, at the estimate.
     """
     predictor = problem.predictor
     shifts, squares = {}, {}
     for choice, settings in predictor.settings.varied.items():
-        other = predictor.with_settings(settings).predict(values)
-        change = np.zeros(len(jacobian))
+        other = replace(problem, predictor=predictor.with_settings(settings)).residuals(values)
+        change = REMAINS[choice] * (other - residuals)
         for key, rows in problem.rows.items():
-            name, channel = key
-            after, before = (np.asarray(p[name].channels[channel].values, float) for p in (other, predicted))
-            d = (after - before).ravel()[problem.seen[key]]
-            change[rows] = d / problem.sigma(key)
-            squares[f"{name}/{channel}"] = squares.get(f"{name}/{channel}", 0.0) + float(np.mean(d**2))
+            d = change[rows] * problem.sigma(key)
+            squares["/".join(key)] = squares.get("/".join(key), 0.0) + float(np.mean(d**2))
         move = -np.linalg.lstsq(jacobian, change, rcond=None)[0]
         shifts[choice] = dict(zip(problem.free, map(float, move), strict=True))
     return shifts, {key: value**0.5 for key, value in squares.items()}

@@ -107,7 +107,7 @@ def refit(
     energy = {k: v for k, v in values.items() if k.startswith("energy.")}
     curve = predictor(alone, Sample("curve", {"curve": test})).predict(energy)["curve"]
     target = np.asarray(curve.channels["nominal_stress"].values, float) * np.concatenate([[factor[0]], factor])
-    noise = 0.01 * np.abs(target).max()
+    noise = 0.01 * float(np.abs(target).max())
     wanted = Recording("curve", "uniaxial", test.inputs, {"nominal_stress": Channel(time, target, "Pa", noise)})
     posed = problem(predictor(alone, Sample("curve", {"curve": wanted})), start=energy, stable=True)
     found = posed.values(descend(posed).y)

@@ -1,0 +1,33 @@
+"""A second process gives what this one gives, and its errors come back."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from tissuejax.experiments import programs, workers
+
+
+def test_results_come_back_in_order_and_equal():
+    x = [np.arange(4.0) + i for i in range(5)]
+    jobs = [(_square, 3, a) for a in x]
+    out = workers.run_all(jobs, 2)
+    assert all(np.allclose(o, 3 * a**2) for o, a in zip(out, x))
+    assert np.allclose(programs.run(_square, 3, x[1]), out[1])
+
+
+def test_a_failing_job_raises_here():
+    with pytest.raises(ValueError, match="no such thing"):
+        workers.run_all([(_fails, 0, np.zeros(2))] * 3, 2)
+
+
+def test_inside_a_transformation_a_program_is_a_function():
+    assert jax.grad(lambda x: programs.run(_square, 2, x).sum())(jnp.ones(3)).tolist() == [4.0, 4.0, 4.0]
+
+
+def _square(static, x):
+    return static * x**2
+
+
+def _fails(static, x):
+    raise ValueError("no such thing")

@@ -1,0 +1,135 @@
+"""Programs on a second core: helper processes that are asked over a pipe.
+
+Threads would be lighter, but two programs at once in one process wait for each other for ever (jax 0.10.2 on CPU, also
+when each is run by the thread that asks). A worker is a bare interpreter, started when first needed and kept; it finds
+compiled programs in the disk cache. Its main module is this one, so the caller's script is never run twice.
+"""
+
+import atexit
+import os
+import pickle
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import jax
+
+from tissuejax.experiments import programs
+
+Job = tuple[Any, ...]  # function, static, arguments: as `programs.run` takes them
+
+
+class Worker:
+    """One helper process."""
+
+    def __init__(self):
+        root = str(Path(__file__).resolve().parents[2])
+        path = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH", "")]))
+        flags = os.environ.get("XLA_FLAGS", "")
+        if "xla_cpu_multi_thread_eigen" not in flags:
+            flags = f"{flags} --xla_cpu_multi_thread_eigen=false".strip()
+        double = "1" if jax.config.jax_enable_x64 else "0"
+        environment = os.environ | {
+            "PYTHONPATH": path,
+            "XLA_FLAGS": flags,
+            "JAX_ENABLE_X64": double,
+            "JAX_PLATFORMS": "cpu",
+        }
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "tissuejax.experiments.workers"],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment,
+        )  # fmt: skip
+        atexit.register(self.close)
+
+    def ask(self, job: Job) -> Any:
+        """The result of one job; an exception of the job is raised here."""
+        pickle.dump(jax.device_get(job), self.process.stdin)
+        self.process.stdin.flush()
+        fine, answer = pickle.load(self.process.stdout)
+        if not fine:
+            raise answer
+        return answer
+
+    def close(self) -> None:
+        """End the process."""
+        if self.process.poll() is None:
+            self.process.stdin.close()
+            self.process.wait(timeout=10)
+
+
+_workers: list[Worker] = []
+
+
+def run_all(jobs: Sequence[Job], processes: int) -> list:
+    """Results of all jobs in order, on the host; this process takes them from the front, each worker from the back.
+
+    Args:
+        jobs: (function, static, *arguments); the function has to be importable.
+        processes: this one included.
+    """
+    waiting, results = deque(range(len(jobs))), [None] * len(jobs)
+    failures: list[BaseException] = []
+
+    def serve(worker: Worker) -> None:
+        while True:
+            try:
+                i = waiting.pop()
+            except IndexError:
+                return
+            try:
+                results[i] = worker.ask(jobs[i])
+            except (EOFError, BrokenPipeError, pickle.PicklingError):  # a lost worker: its job is done here
+                waiting.appendleft(i)
+                _workers.remove(worker)
+                return
+            except Exception as error:
+                failures.append(error)
+                return
+
+    helpers = min(processes, len(jobs)) - 1
+    while len(_workers) < helpers:
+        _workers.append(Worker())
+    threads = [threading.Thread(target=serve, args=(w,), daemon=True) for w in _workers[:helpers]]
+    for thread in threads:
+        thread.start()
+    while True:
+        while waiting:
+            try:
+                i = waiting.popleft()
+            except IndexError:
+                break
+            results[i] = jax.device_get(programs.run(*jobs[i]))
+        for thread in threads:
+            thread.join()
+        if failures:
+            raise failures[0]
+        if not waiting:
+            return results
+
+
+def serve_pipe() -> None:
+    """The worker's side: jobs from standard input, results to standard output; prints go to the error stream."""
+    from tissuejax.cache import keep_programs
+
+    keep_programs()
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    while True:
+        try:
+            job = pickle.load(sys.stdin.buffer)
+        except EOFError:
+            return
+        try:
+            reply = (True, jax.device_get(programs.run(*job)))
+        except Exception as error:
+            reply = (False, error)
+        pickle.dump(reply, answers)
+        answers.flush()
+
+
+if __name__ == "__main__":
+    serve_pipe()
