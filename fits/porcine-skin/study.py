@@ -25,7 +25,7 @@ def main(folder: Path) -> str:
     sample = tj.read(folder / "skin.toml")
     record = {"joint": {}, "predicted": {}}
     for energy in (*ISOTROPIC, *FIBRE):
-        options = {"weights": "uniform", "multistart": 6}
+        options = {"weights": "uniform", "multistart": 4}
         if "+" in energy:
             options |= {"bounds": BOUNDS, "start": START}
         found = tj.fit(sample, energy, **options)
@@ -38,7 +38,8 @@ def main(folder: Path) -> str:
         }
         tj.write(found, folder / "figures" / energy.replace("+", "-"))
         for path in PATHS:
-            other = tj.fit(sample, energy, holdout=[path], **options)
+            near = options | {"multistart": 1, "start": {p: found.values[p] for p in found.free}}
+            other = tj.fit(sample, energy, holdout=[path], **near)
             record["predicted"].setdefault(energy, {})[path] = errors(other.holdout)[path]
     write_json(folder / "result.json", record)
     shown = ", ".join(f"{e} {r['rmse_all_kPa']:.1f}" for e, r in record["joint"].items())
