@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test slow bench lint format clean
+.PHONY: demo studies test slow bench lint format clean
 
 $(STAMP): pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -12,6 +12,9 @@ $(STAMP): pyproject.toml
 
 demo: $(STAMP)
 	$(BIN)/tissuejax demo --out out/demo
+
+studies: $(STAMP)
+	$(BIN)/tissuejax study fits/*
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
