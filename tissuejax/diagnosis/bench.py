@@ -71,6 +71,10 @@ class Candidate:
         shapes: paths that mean nothing while the amplitudes are zero, scanned over `grid`.
         grid: settings of the shapes (and, where the effect has no derivative at zero, of amplitudes) to start from.
         cost: relative price of a refit, for benches where a prediction is a simulation.
+        form: tells candidates of one effect apart.
+        held: paths that held-out recordings have for themselves (offsets, phases), fitted there.
+        nominated: False for forms that are only reached from their neighbours.
+        beside: keys of the poorer and the richer form.
     """
 
     name: str
@@ -79,6 +83,9 @@ class Candidate:
     grid: tuple[Mapping[str, float], ...] = ({},)
     cost: float = 1.0
     form: str = ""
+    held: tuple[str, ...] = ()
+    nominated: bool = True
+    beside: tuple[str, ...] = ()
 
     @property
     def key(self) -> str:
@@ -117,18 +124,24 @@ class Bench(abc.ABC):
     warnings: list[str] = field(default_factory=list)
 
     @abc.abstractmethod
-    def predict(self, values: Mapping[str, float]) -> Float[np.ndarray, " N"]:
-        """All channels at `values` (absent paths are neutral)."""
+    def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:
+        """All channels at `values` (absent paths are neutral); with `recordings`, only their rows mean anything."""
 
     @abc.abstractmethod
-    def jacobian(self, values: Mapping[str, float], paths: Sequence[str]) -> Float[np.ndarray, "N k"]:
-        """Derivative of the prediction with respect to `paths`."""
+    def jacobian(
+        self, values: Mapping[str, float], paths: Sequence[str], recordings: Sequence[str] | None = None
+    ) -> Float[np.ndarray, "N k"]:
+        """Derivative of the prediction with respect to `paths`; with `recordings`, only their rows mean anything."""
 
     def columns(
         self, values: Mapping[str, float], settings: Sequence[tuple[Mapping[str, float], str]]
     ) -> Float[np.ndarray, "N k"]:
         """Derivatives with respect to one path each, each at its own setting of shapes on top of `values`."""
         return np.stack([self.jacobian({**values, **dict(s)}, [path])[:, 0] for s, path in settings], axis=1)
+
+    def settings(self, candidate: Candidate, prediction: Float[np.ndarray, " N"]) -> Sequence[Mapping[str, float]]:
+        """Shapes at which to score a candidate; a bench may read some from the residual (a period, a place)."""
+        return candidate.grid
 
     def mask(self, recordings: Sequence[str]) -> np.ndarray:
         """Rows of the long vector that belong to `recordings`."""

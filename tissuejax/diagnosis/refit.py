@@ -2,6 +2,7 @@
 
 Levenberg-Marquardt whose every step is a small bounded linear least-squares problem, so that one-sided
 amplitudes rest on their bound exactly and leave it when the data want them to. Positive shapes move in logarithm.
+What belongs to one recording alone (an offset, a phase) is fitted on the held-out recordings too, all else fixed.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,24 +22,23 @@ class Refit:
 
     Attributes:
         keys: candidates in the set, in the order in which they were added.
-        values: free paths and their values.
+        values: free paths and their values; `own` those of the held-out recordings themselves.
         std: standard errors (natural coordinates); nan on a bound or where nothing is identified.
         at_bound: paths that rest on a bound.
         chi2: whitened chi-square of the fitted recordings (without priors), n its number of samples.
         held: whitened chi-square of the held-out recordings, n_held its number of samples.
-        evaluations: predictions and Jacobians spent.
         prediction: the long vector.
     """
 
     keys: tuple[str, ...]
     values: dict[str, float]
+    own: dict[str, float]
     std: dict[str, float]
     at_bound: tuple[str, ...]
     chi2: float
     n: int
     held: float
     n_held: int
-    evaluations: int
     converged: bool
     prediction: Float[np.ndarray, " N"]
 
@@ -47,86 +47,129 @@ class Refit:
         """Number of free parameters."""
         return len(self.values)
 
+    @property
+    def all(self) -> dict[str, float]:
+        """Values of all recordings."""
+        return {**self.values, **self.own}
 
-def _to(x: float, log: bool) -> float:
-    return float(np.log(x)) if log else x
 
+@dataclass
+class Descent:
+    """A descent over `paths` on some recordings, the rest of the values held."""
 
-def refit(
-    bench: Bench,
-    misfit: Misfit,
-    keys: Sequence[str],
-    start: Mapping[str, float],
-    *,
-    iterations: int = 30,
-    tolerance: float = 0.02,
-) -> Refit:
-    """Fit base and candidates `keys` from `start` (absent paths start at the bench's neutral values).
+    bench: Bench
+    misfit: Misfit
+    paths: tuple[str, ...]
+    recordings: tuple[str, ...]
+    rest: dict[str, float]
 
-    Stops when a step lowers the objective by less than `tolerance` (chi-square units) twice.
-    """
-    paths = tuple(dict.fromkeys([*bench.base, *(p for key in keys for p in bench.candidates[key].paths)]))
-    log = np.array([bench.free[p].log for p in paths])
-    low = np.array([_to(bench.free[p].lower, bench.free[p].log) for p in paths])
-    high = np.array([_to(bench.free[p].upper, bench.free[p].log) for p in paths])
-    scale = np.array([1.0 if bench.free[p].log else bench.free[p].scale for p in paths])
-    priors = [(i, *bench.free[p].prior) for i, p in enumerate(paths) if bench.free[p].prior is not None]
-    whole = {**bench.start, **start}
-    x = np.clip(np.array([_to(whole[p], bench.free[p].log) for p in paths]), low, high)
+    def __post_init__(self):
+        free = [self.bench.free[p] for p in self.paths]
+        self.log = np.array([f.log for f in free], bool)
+        self.low = np.array([np.log(f.lower) if f.log else f.lower for f in free])
+        self.high = np.array([np.log(f.upper) if f.log else f.upper for f in free])
+        self.scale = np.array([1.0 if f.log else f.scale for f in free])
+        self.priors = [(i, *f.prior) for i, f in enumerate(free) if f.prior is not None]
 
-    def natural(x: np.ndarray) -> np.ndarray:
-        return np.where(log, np.exp(np.where(log, x, 0.0)), x)
+    def natural(self, x: np.ndarray) -> dict[str, float]:
+        """Values of the free paths at x."""
+        return dict(zip(self.paths, np.where(self.log, np.exp(np.where(self.log, x, 0.0)), x).tolist()))
 
-    def objective(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-        prediction = bench.predict(dict(zip(paths, natural(x).tolist())))
-        r = misfit.residual(prediction, bench.fitted)
+    def point(self, values: Mapping[str, float]) -> np.ndarray:
+        """x inside the box from values."""
+        x = [np.log(max(values[p], 1e-300)) if log else values[p] for p, log in zip(self.paths, self.log)]
+        return np.clip(np.array(x), self.low, self.high)
+
+    def objective(self, x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        """Sum of squares with priors, whitened residual, prediction."""
+        prediction = self.bench.predict({**self.rest, **self.natural(x)}, self.recordings)
+        r = self.misfit.residual(prediction, self.recordings)
         if not np.all(np.isfinite(r)):
             return np.inf, r, prediction
-        extra = [(m - x[i]) / s for i, m, s in priors]
-        r = np.concatenate([r, extra]) if extra else r
+        if self.priors:
+            r = np.concatenate([r, [(m - x[i]) / s for i, m, s in self.priors]])
         return float(r @ r), r, prediction
 
-    cost, r, prediction = objective(x)
-    evaluations, damping, small, converged = 1, 1e-3, 0, False
-    jac = None
-    for _ in range(iterations):
-        if not np.isfinite(cost):
-            break
-        jac = _jacobian(bench, misfit, paths, x, natural, log, priors)
-        evaluations += 1
-        if not np.all(np.isfinite(jac)):
-            break
-        q, t = np.linalg.qr(jac)
-        qr = q.T @ r
-        diagonal = np.maximum(np.linalg.norm(jac, axis=0), 1e-12 * np.max(np.linalg.norm(jac, axis=0)) + 1e-300)
-        accepted = False
-        for _ in range(8):
-            a = np.vstack([t, np.diag(np.sqrt(damping) * np.maximum(diagonal, 1e-6 / scale))])
-            step = _bounded(a, np.concatenate([qr, np.zeros(len(x))]), low - x, high - x)
-            trial = np.clip(x + step, low, high)
-            new, r_new, p_new = objective(trial)
-            evaluations += 1
-            if new < cost:
-                accepted = True
-                break
-            damping = max(damping * 8, 1e-6)
-            if np.max(np.abs(step) / np.maximum(scale, np.abs(x))) < 1e-9:
-                break
-        if not accepted:
-            converged = True
-            break
-        drop, cost, x, r, prediction = cost - new, new, trial, r_new, p_new
-        damping = max(damping / 10, 1e-9)
-        small = small + 1 if drop < tolerance else 0
-        if small >= 2 or drop < 1e-3 * tolerance:
-            converged = True
-            break
-    return _finish(
-        bench, misfit, tuple(keys), paths, x, natural, log, (low, high), cost, prediction, evaluations, converged
-    )
+    def jacobian(self, x: np.ndarray, priors: bool = True) -> np.ndarray:
+        """Whitened derivative of the prediction by x, with the rows of the priors."""
+        values = self.natural(x)
+        jac = self.bench.jacobian({**self.rest, **values}, self.paths, self.recordings)
+        factor = np.where(self.log, [values[p] for p in self.paths], 1.0)
+        jac = self.misfit.whiten(jac * factor, self.recordings)
+        if self.priors and priors:
+            rows = np.zeros((len(self.priors), len(self.paths)))
+            for row, (i, _, s) in zip(rows, self.priors):
+                row[i] = 1 / s
+            jac = np.concatenate([jac, rows])
+        return jac
+
+    def run(self, x: np.ndarray, iterations: int, tolerance: float) -> tuple[np.ndarray, float, np.ndarray, bool]:
+        """From x to (x, cost, prediction, converged).
+
+        A Jacobian costs many predictions, so while steps do what they promised it is only corrected along them (Broyden).
+        """
+        cost, r, prediction = self.objective(x)
+        damping, small, jac, age = 1e-3, 0, None, 0
+        for _ in range(iterations):
+            if not np.isfinite(cost):
+                return x, cost, prediction, False
+            if jac is None:
+                jac, age = self.jacobian(x), 0
+            if not np.all(np.isfinite(jac)):
+                return x, cost, prediction, False
+            q, t = np.linalg.qr(jac)
+            right = q.T @ r
+            size = np.linalg.norm(jac, axis=0)
+            size = np.maximum(size, 1e-9 * np.max(size, initial=0.0) + 1e-6 / self.scale)
+            for _ in range(10):
+                a = np.vstack([t, np.diag(np.sqrt(damping) * size)])
+                step = bounded(a, np.concatenate([right, np.zeros(len(x))]), self.low - x, self.high - x)
+                trial = np.clip(x + step, self.low, self.high)
+                step = trial - x
+                new, r_new, p_new = self.objective(trial)
+                if new < cost or age > 0:
+                    break
+                damping = max(damping * 8, 1e-6)
+                if np.max(np.abs(step) / np.maximum(self.scale, np.abs(x)), initial=0.0) < 1e-9:
+                    return x, cost, prediction, True
+            else:
+                return x, cost, prediction, True
+            if not new < cost:  # a corrected Jacobian failed: take a true one
+                jac = None
+                continue
+            left = r - jac @ step
+            promised = cost - float(left @ left)
+            drop = cost - new
+            if drop > 0.7 * promised and age < 3 and step @ step > 0:
+                jac, age = jac + np.outer(left - r_new, step) / (step @ step), age + 1
+            else:
+                jac = None
+            cost, x, r, prediction = new, trial, r_new, p_new
+            damping = max(damping / 10, 1e-9)
+            small = small + 1 if drop < tolerance else 0
+            if small >= 2 or drop < 1e-3 * tolerance:
+                return x, cost, prediction, True
+        return x, cost, prediction, False
+
+    def errors(self, x: np.ndarray, r: np.ndarray) -> tuple[dict[str, float], tuple[str, ...]]:
+        """Standard errors in natural coordinates (scaled up by an honest misfit), and the paths on a bound."""
+        span = np.where(np.isfinite(self.high - self.low), self.high - self.low, 1.0)
+        at = (x - self.low < 1e-6 * span) | (self.high - x < 1e-6 * span)
+        std = np.full(len(x), np.nan)
+        jac = self.jacobian(x, priors=False)
+        norms = np.linalg.norm(jac, axis=0)
+        use = ~at & (norms > 0) & np.isfinite(norms)
+        if use.any():
+            _, s, v = np.linalg.svd(jac[:, use] / norms[use], full_matrices=False)
+            if s[-1] > 1e-8 * s[0]:
+                inflate = max(1.0, float(r @ r) / max(len(r) - len(x), 1))
+                std[use] = np.sqrt(inflate * np.sum((v.T / s) ** 2, axis=1)) / norms[use]
+        values = self.natural(x)
+        std = np.where(self.log, std * np.array([values[p] for p in self.paths]), std)
+        return dict(zip(self.paths, std.tolist())), tuple(p for p, b in zip(self.paths, at) if b)
 
 
-def _bounded(a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+def bounded(a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """min |a s - b| with low <= s <= high; the free solution where it is allowed."""
     step = np.linalg.lstsq(a, b, rcond=None)[0]
     if np.all(step >= low) and np.all(step <= high):
@@ -136,45 +179,38 @@ def _bounded(a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) ->
     return answer.x / size
 
 
-def _jacobian(bench, misfit, paths, x, natural, log, priors) -> np.ndarray:
-    values = natural(x)
-    jac = bench.jacobian(dict(zip(paths, values.tolist())), paths)
-    jac = misfit.whiten(jac * np.where(log, values, 1.0), bench.fitted)
-    if priors:
-        rows = np.zeros((len(priors), len(paths)))
-        for row, (i, _, s) in zip(rows, priors):
-            row[i] = 1 / s
-        jac = np.concatenate([jac, rows])
-    return jac
+def refit(
+    bench: Bench,
+    misfit: Misfit,
+    keys: Sequence[str],
+    start: Mapping[str, float],
+    *,
+    iterations: int = 30,
+    tolerance: float = 0.1,
+    final: bool = True,
+) -> Refit:
+    """Fit base and candidates `keys` from `start` (absent paths start at the bench's neutral values).
 
-
-def _finish(bench, misfit, keys, paths, x, natural, log, bounds, cost, prediction, evaluations, converged) -> Refit:
-    values = natural(x)
-    low, high = bounds
-    span = np.where(np.isfinite(high - low), high - low, 1.0)
-    at = (x - low < 1e-6 * span) | (high - x < 1e-6 * span)
-    std = np.full(len(x), np.nan)
+    Args:
+        tolerance: stops when two steps in a row lower chi-square by less.
+        final: False leaves standard errors and held-out recordings out, for trial starts.
+    """
+    whole = {**bench.start, **start}
+    paths = tuple(dict.fromkeys([*bench.base, *(p for key in keys for p in bench.candidates[key].paths)]))
+    descent = Descent(bench, misfit, paths, bench.fitted, {})
+    x, cost, prediction, converged = descent.run(descent.point(whole), iterations, tolerance)
+    values, own, std, at_bound = descent.natural(x), {}, {}, ()
     r = misfit.residual(prediction, bench.fitted)
-    if np.isfinite(cost):
-        jac = misfit.whiten(bench.jacobian(dict(zip(paths, values.tolist())), paths), bench.fitted)
-        norms = np.linalg.norm(jac, axis=0)
-        use = ~at & (norms > 0) & np.isfinite(norms)
-        if use.any():
-            _, s, v = np.linalg.svd(jac[:, use] / norms[use], full_matrices=False)
-            if s[-1] > 1e-7 * s[0]:
-                inflate = max(1.0, float(r @ r) / max(len(r) - len(x), 1))
-                std[use] = np.sqrt(inflate * np.sum((v.T / s) ** 2, axis=1)) / norms[use]
-    held = misfit.residual(prediction, bench.held_out)
-    return Refit(
-        keys,
-        dict(zip(paths, values.tolist())),
-        dict(zip(paths, std.tolist())),
-        tuple(p for p, b in zip(paths, at) if b),
-        float(r @ r) if np.all(np.isfinite(r)) else np.inf,
-        len(r),
-        float(held @ held) if np.all(np.isfinite(held)) else np.inf,
-        len(held),
-        evaluations,
-        converged,
-        prediction,
-    )
+    chi2 = float(r @ r) if np.isfinite(cost) else np.inf
+    held = np.full(misfit.count(bench.held_out), np.inf)
+    if final and np.isfinite(chi2):
+        std, at_bound = descent.errors(x, r)
+        belong = tuple(p for key in keys for p in bench.candidates[key].held)
+        if belong and bench.held_out:
+            second = Descent(bench, misfit, belong, bench.held_out, values)
+            y, *_ = second.run(second.point(whole), iterations, tolerance)
+            own = second.natural(y)
+        prediction = bench.predict({**values, **own})
+        held = misfit.residual(prediction, bench.held_out)
+    outside = float(held @ held) if np.all(np.isfinite(held)) else np.inf
+    return Refit(tuple(keys), values, own, std, at_bound, chi2, len(r), outside, len(held), converged, prediction)

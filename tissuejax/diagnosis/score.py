@@ -82,19 +82,20 @@ def scores(
     r = misfit.residual(prediction, names)
     expected = misfit.count(names) - len(free)
     excess = max(float(r @ r) - expected, 1.0)
-    basis = complement(misfit.whiten(bench.jacobian(values, free), names))
+    basis = complement(misfit.whiten(bench.jacobian(values, free, names), names))
     r = r - basis @ (basis.T @ r)
-    wanted = [(i, s, a) for i, c in enumerate(candidates) for s in c.grid for a in c.amplitudes]
+    grids = [list(bench.settings(c, prediction)) for c in candidates]
+    wanted = [(i, s, a) for i, c in enumerate(candidates) for s in grids[i] for a in c.amplitudes]
     if not wanted:
         return []
     columns = misfit.whiten(bench.columns(values, [(s, a) for _, s, a in wanted]), names)
     columns = columns - basis @ (basis.T @ columns)
     out = []
     at = 0
-    for c in candidates:
+    for c, grid in zip(candidates, grids):
         trials = []
         k = len(c.amplitudes)
-        for s in c.grid:
+        for s in grid:
             block = columns[:, at : at + k]
             at += k
             if not np.all(np.isfinite(block)):

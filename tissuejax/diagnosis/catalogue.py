@@ -1,0 +1,182 @@
+"""From effects to candidates: which parameters an effect frees, where its shapes are scanned, which bounds hold.
+
+Most effects are one candidate. Some come in forms, from spare to rich (one relaxation time, two, three; one offset for
+all recordings or one each), all under one name: a spare form is nominated, and where it stands it is tried with its richer and
+its poorer neighbour, so that a law that differs from ours bends the effect's own form before another effect
+is called to help.
+"""
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tissuejax.diagnosis.bench import Candidate, Free
+from tissuejax.effects.catalogue import effects
+from tissuejax.effects.drift import Drift
+from tissuejax.effects.effect import Effect
+from tissuejax.effects.energy_form import EnergyForm
+from tissuejax.effects.nonlinear_viscosity import NonlinearViscosity
+from tissuejax.effects.softening import Softening
+from tissuejax.effects.viscoelasticity import Viscoelasticity
+from tissuejax.model import Model
+from tissuejax.parameters import Parameter
+
+MOST = 24  # settings of one candidate's shapes at most
+DEAR = ("machine-compliance", "nonlinear-viscosity", "compressibility")  # a search inside every prediction
+
+
+@dataclass(frozen=True)
+class Form:
+    """Which parameters of an effect are free in one form of it.
+
+    Attributes:
+        name: of the form; "" for the only one.
+        free: parameter names, amplitudes and shapes.
+        grid: shapes to scan.
+        nominated: False for forms that are only reached from a neighbour.
+        each: parameters with a value of their own in every recording.
+    """
+
+    name: str
+    free: tuple[str, ...]
+    grid: Mapping[str, tuple[float, ...]]
+    nominated: bool = True
+    each: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An effect with its forms, spare to rich, and the name under which it is reported."""
+
+    effect: Effect
+    forms: tuple[Form, ...]
+    title: str
+
+    @property
+    def dear(self) -> bool:
+        """Whether it turns every prediction into a search."""
+        return self.effect.name in DEAR or not self.effect.isotropic
+
+    def declare(
+        self, model: Model, fitted: tuple[str, ...], held_out: tuple[str, ...]
+    ) -> tuple[dict[str, Free], dict[str, float], list[Candidate]]:
+        """Free parameters, their neutral values, and the candidates, for these recordings."""
+        prefix = f"effects.{self.effect.name}"
+        known = {p.name: p for p in self.effect.parameters}
+        free, start, candidates = {}, {}, []
+        for i, form in enumerate(self.forms):
+            amplitudes, shapes, held, paths = [], [], [], {}
+            for name in form.free:
+                p, shape = known[name], name not in self.effect.amplitudes
+                own = [f"{prefix}.{name}.{r}" for r in fitted] if name in form.each else [f"{prefix}.{name}"]
+                paths[name] = own
+                (shapes if shape else amplitudes).extend(own)
+                if name in form.each:
+                    held += [f"{prefix}.{name}.{r}" for r in held_out]
+                for path in (*own, *(h for h in held if h.startswith(f"{prefix}.{name}."))):
+                    free[path] = limits(p, shape, form.grid.get(name, self.effect.grid.get(name, ())))
+                    start[path] = float(self.effect.neutral[name])
+            candidates.append(
+                Candidate(
+                    self.title,
+                    tuple(amplitudes),
+                    tuple(shapes),
+                    settings(form.grid, paths),
+                    form=form.name,
+                    held=tuple(held),
+                    nominated=form.nominated,
+                )
+            )
+        for i, c in enumerate(candidates):
+            beside = [candidates[j].key for j in (i - 1, i + 1) if 0 <= j < len(candidates)]
+            candidates[i] = replace(c, beside=tuple(beside))
+        return free, start, candidates
+
+
+def settings(grid: Mapping[str, tuple[float, ...]], paths: Mapping[str, list[str]]) -> tuple[dict[str, float], ...]:
+    """Combinations of the values to scan, thinned to at most MOST."""
+    combinations = list(itertools.product(*grid.values()))
+    every = max(1, math.ceil(len(combinations) / MOST))
+    return tuple(
+        {path: float(v) for name, v in zip(grid, values) for path in paths[name]} for values in combinations[::every]
+    ) or ({},)
+
+
+def limits(p: Parameter, shape: bool, grid: tuple[float, ...]) -> Free:
+    """Range and scale of a parameter in a refit: declared bounds, and for shapes at most ten times beyond the grid."""
+    lower, upper = p.lower, p.upper
+    log = shape and p.lower >= 0 and p.default > 0
+    if log:
+        known = [v for v in (*grid, p.default) if v > 0]
+        lower, upper = max(lower, min(known) / 10), min(upper, max(known) * 10)
+    return Free(lower, upper, p.typical, p.unit, log=log)
+
+
+TIMES = tuple(float(t) for t in np.geomspace(0.1, 60.0, 7))
+
+
+def entries(energy_scale: float, strain_scale: float) -> list[Entry]:
+    """All effects that act in material tests, in their forms.
+
+    Args:
+        energy_scale: typical strain energy of the sample's recordings, Pa: damage scales are scanned around it.
+        strain_scale: largest |ln stretch|: exponents of exponential terms are scanned so that they bend within it.
+    """
+    pairs = {"tau1": (0.2, 0.6, 2.0), "tau2": (4.0, 12.0, 40.0)}
+    damage = {"m": tuple(energy_scale * x for x in (0.02, 0.1, 0.4))}
+    exponent = {"exponent": tuple(x / strain_scale**2 for x in (0.3, 1.5))}
+    special = {
+        "viscoelasticity": (
+            Viscoelasticity(terms=3),
+            (
+                Form("one time", ("g1", "tau1"), {"tau1": TIMES}),
+                Form("two times", ("g1", "g2", "tau1", "tau2"), pairs),
+                Form("three times", ("g1", "g2", "g3", "tau1", "tau2", "tau3"), {}, nominated=False),
+            ),
+        ),
+        "softening": (
+            Softening(loading=True),
+            (
+                Form("", ("r", "m"), damage),
+                Form("with growth", ("r", "m", "beta"), {}, nominated=False),
+                Form("with loading", ("r", "d", "m", "beta"), {}, nominated=False),
+            ),
+        ),
+        "drift": (
+            Drift(separate=True),
+            (
+                Form("offset", ("offset",), {}),
+                Form("offset and rate", ("offset", "rate"), {}),
+                Form("each recording", ("offset", "rate"), {}, each=("offset", "rate")),
+            ),
+        ),
+        "energy-form": (
+            EnergyForm(terms=("C30", "C01", "C02", "exponential")),
+            (
+                Form("cubic", ("C30",), {}),
+                Form("second invariant", ("C01",), {}),
+                Form("exponential", ("exponential", "exponent"), exponent),
+                Form("cubic and second invariant", ("C30", "C01"), {}, nominated=False),
+                Form("all", ("C30", "C01", "C02", "exponential", "exponent"), {}, nominated=False),
+            ),
+        ),
+    }
+    out = []
+    for name, kind in effects("homogeneous").items():
+        if name == "nonlinear-viscosity":
+            grid = {"tau": (1.0, 10.0), "stress": (1.0,), "exponent": (3.0,)}
+            form = Form("load-dependent", ("g", "tau", "stress", "exponent"), grid, nominated=False)
+            out.append(Entry(NonlinearViscosity(), (form,), "viscoelasticity"))
+        elif name in special:
+            effect, forms = special[name]
+            out.append(Entry(effect, forms, name))
+        else:
+            effect = kind()
+            free = tuple(p.name for p in effect.parameters if not p.frozen)
+            each = tuple(p.name for p in effect.parameters if p.each)
+            grid = {k: v for k, v in effect.grid.items() if k not in ("frequency",)}
+            out.append(Entry(effect, (Form("", free, grid, each=each),), name))
+    return out

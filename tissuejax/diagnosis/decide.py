@@ -1,0 +1,118 @@
+"""From a search to a verdict: nothing missing, found, ambiguous, or unexplained.
+
+Order of the questions, each with its own number:
+1. Is anything missing? The base fit's whitened chi-square and correlation against pure noise, in every recording, and whether
+   any set lowers the criterion by more than `GAIN`.
+2. Which set? The smallest criterion; then every effect is asked whether it is needed: its removal must cost more than
+   `GAIN` and a share `NEEDED` of the misfit, or reach noise level where the smaller set doesn't.
+3. Does it explain? What is left must be noise, or at most a share `LEFT` of what was missing, in the fitted recordings and in
+   the held-out ones. Otherwise something is missing that the catalogue has no name for.
+4. Could it be another? Sets of no more effects whose criterion is within `CLOSE` can't be told apart by these data.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tissuejax.diagnosis.quality import SIGNIFICANT, Quality, quality
+from tissuejax.diagnosis.refit import Refit
+from tissuejax.diagnosis.search import Search
+
+GAIN = 8.0
+CLOSE = 6.0
+NEEDED = 0.02
+LEFT = 0.15
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The answer.
+
+    Attributes:
+        kind: "nothing-missing", "found", "ambiguous" or "unexplained".
+        chosen: the fit that stands (the base for "nothing-missing"; the best attempt for "unexplained").
+        rivals: sets that can't be told from the chosen one.
+        explained: share of the base's misfit that the chosen set removes, fitted and held out.
+        reasons: sentences.
+    """
+
+    kind: str
+    chosen: Refit
+    rivals: tuple[Refit, ...]
+    explained: tuple[float, float]
+    reasons: tuple[str, ...]
+    base_quality: Quality
+    quality: Quality
+    confidence: float = math.nan
+    notes: dict = field(default_factory=dict)
+
+
+def excess(s: Search, r: Refit) -> tuple[float, float]:
+    """Chi-square beyond noise, fitted and held out, never below zero."""
+    return max(r.chi2 - (r.n - r.k), 0.0), max(r.held - r.n_held, 0.0)
+
+
+def needed(s: Search, larger: Refit, smaller: Refit) -> bool:
+    """Whether the effect by which `larger` exceeds `smaller` has to be there."""
+    gained = s.criterion(smaller) - s.criterion(larger)
+    if gained < GAIN:
+        return False
+    if sum(excess(s, smaller)) - sum(excess(s, larger)) < NEEDED * sum(excess(s, s.empty)):
+        return quality(s, larger).noise and not quality(s, smaller).noise and gained > 3 * GAIN
+    return True
+
+
+def choose(s: Search) -> Refit:
+    """The set of smallest criterion, less every effect that isn't needed."""
+    best = min(s.refits.values(), key=s.criterion)
+    while best.keys:
+        smaller = [s.refits[frozenset(best.keys) - {k}] for k in best.keys if frozenset(best.keys) - {k} in s.refits]
+        smaller = [r for r in smaller if not needed(s, best, r)]
+        if not smaller:
+            break
+        best = min(smaller, key=s.criterion)
+    return best
+
+
+def decide(s: Search) -> Verdict:
+    """The verdict of a finished search; see the module's text."""
+    empty, chosen = s.empty, choose(s)
+    before, after = quality(s, empty), quality(s, chosen)
+    e0, e1 = excess(s, empty), excess(s, chosen)
+    explained = tuple(1 - b / a if a > 0 else 1.0 for a, b in zip(e0, e1))
+    reasons = []
+    rivals: tuple[Refit, ...] = ()
+    if not chosen.keys:
+        kind = "nothing-missing" if before.noise else "unexplained"
+        reasons.append(
+            "the residual of the base model is noise"
+            if before.noise
+            else "the residual is not noise, and no effect of the catalogue explains it"
+        )
+    else:
+        total = 1 - sum(e1) / max(sum(e0), 1e-9)
+        poor = not after.noise and total < 1 - LEFT
+        held = not after.noise and bool(s.bench.held_out) and explained[1] < 1 - 2 * LEFT and after.z_held > SIGNIFICANT
+        if poor or held:
+            kind = "unexplained"
+            reasons.append(f"the best set explains {total:.0%} of the misfit ({explained[1]:.0%} of the held-out one)")
+        else:
+            rivals = tuple(
+                r
+                for r in sorted(s.refits.values(), key=s.criterion)
+                if r.keys
+                and len(r.keys) <= len(chosen.keys)
+                and set(r.keys) != set(chosen.keys)
+                and s.criterion(r) < s.criterion(chosen) + CLOSE
+            )
+            kind = "ambiguous" if rivals else "found"
+    return Verdict(kind, chosen, rivals, explained, tuple(reasons), before, after, confidence(s, chosen))
+
+
+def confidence(s: Search, chosen: Refit) -> float:
+    """Weight of the chosen set among all sets of no more effects, from the criterion, tempered for unknown laws."""
+    rivals = [r for r in s.refits.values() if len(r.keys) <= max(len(chosen.keys), 1)]
+    scale = max(1.0, chosen.chi2 / max(chosen.n, 1))
+    gaps = np.array([s.criterion(r) - s.criterion(chosen) for r in rivals]) / (4 * scale)
+    return float(1 / np.sum(np.exp(-np.clip(gaps, -50, 50))))

@@ -1,0 +1,87 @@
+"""The diagnosis of one sample, from a recording file to a verdict."""
+
+import os
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from tissuejax.diagnosis.decide import decide
+from tissuejax.diagnosis.material import MaterialBench
+from tissuejax.diagnosis.result import Diagnosis
+from tissuejax.diagnosis.search import Budget, search
+from tissuejax.diagnosis.sigma import sigmas
+from tissuejax.energies.catalogue import energy as named_energy
+from tissuejax.errors import InputError, unknown
+from tissuejax.experiments.catalogue import experiment
+from tissuejax.progress import Progress, Silent
+from tissuejax.recordings.files import read
+from tissuejax.recordings.recording import Sample
+from tissuejax.storage import write_json
+
+
+def diagnose(
+    source: str | os.PathLike | Sample,
+    energy: str = "reduced-polynomial-2",
+    holdout: str | Sequence[str] | None = None,
+    out: str | os.PathLike | None = None,
+    progress: Progress | None = None,
+    effects: Sequence[str] | None = None,
+    ogden_form: str | None = None,
+    budget: Budget | None = None,
+) -> Diagnosis:
+    """What is missing in the model of a sample: the verdict, with everything it rests on.
+
+    Args:
+        source: a recording file or a sample.
+        energy: base model, by its name on the command line.
+        holdout: recordings that take no part in any fit; the last one by default, none if there is only one.
+        out: folder for `result.json` and the unexplained remainder; nothing is written by default.
+        effects: names of the effects to try; all that can act by default.
+        ogden_form: for `ogden-N`.
+        budget: how much the search may spend.
+
+    Raises:
+        InputError: a file that can't be read, an unknown recording or effect, fewer samples than parameters.
+        NotConverged: the base model can't be fitted at all.
+    """
+    begun = time.perf_counter()
+    sample = source if isinstance(source, Sample) else read(source)
+    fitted, held_out, remarks = split(sample, holdout)
+    base = named_energy(energy, ogden_form)
+    kind = experiment(sample.recordings[fitted[0]].experiment).kind
+    if kind != "homogeneous":
+        raise InputError(f"{sample.name}: recordings of kind {kind!r} can't be diagnosed yet")
+    sigma, more = sigmas(sample, (*fitted, *held_out))
+    bench = MaterialBench.of(sample, base, fitted, held_out, sigma, effects)
+    bench.warnings += [*remarks, *more]
+    n = sum(len(s.time) for s in bench.segments if s.recording in fitted)
+    if n <= len(bench.base):
+        raise InputError(
+            f"{sample.name}: {n} samples for {len(bench.base)} parameters of {energy}; fit a smaller energy, or record more"
+        )
+    with (progress or Silent()).stage(f"diagnosing {sample.name}") as stage:
+        found = search(bench, budget, lambda note: stage.advance(note=note))
+    verdict = decide(found)
+    diagnosis = Diagnosis(sample.name, energy, found, verdict, time.perf_counter() - begun)
+    if out is not None:
+        write_json(Path(out) / "result.json", diagnosis.as_dict())
+        write_json(Path(out) / "remainder.json", diagnosis.remainders())
+    return diagnosis
+
+
+def split(sample: Sample, holdout: str | Sequence[str] | None) -> tuple[tuple[str, ...], tuple[str, ...], list[str]]:
+    """Fitted and held-out recordings, and remarks on the choice."""
+    names = tuple(sample.recordings)
+    if holdout is None:
+        if len(names) < 2:
+            remark = "there is one recording only: nothing could be held out, so the verdict rests on the fit alone"
+            return names, (), [remark]
+        return names[:-1], names[-1:], []
+    held = (holdout,) if isinstance(holdout, str) else tuple(holdout)
+    for name in held:
+        if name not in names:
+            raise unknown("recording", name, names)
+    left = tuple(n for n in names if n not in held)
+    if not left:
+        raise InputError(f"{sample.name}: all recordings are held out; leave at least one to fit")
+    return left, held, []

@@ -1,0 +1,205 @@
+"""The bench of material tests: one compiled model with every effect in it, all neutral until freed.
+
+Compilation would cost more than all the numerics, so no candidate gets a program of its own: the model holds all
+effects of the catalogue, and a set of candidates is a choice of which parameters move. Time series are padded, everything
+else is an argument: one program for a prediction, whatever the sample. Effects with memory, and those that turn a
+prediction into a search (fibres, compressibility, a compliant rig), join the model only where they are freed.
+
+Derivatives are one-sided differences in double precision (relative error 1e-6; a test holds them against forward mode): a
+prediction takes about a millisecond, so they cost as much as forward mode to run, and nothing to compile, where
+the linearised program takes three times as long to compile as the prediction.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+import jax
+import numpy as np
+from jaxtyping import Array, Float
+
+from tissuejax.diagnosis.bench import Bench, Candidate, Free, Segment
+from tissuejax.diagnosis.catalogue import Entry, entries
+from tissuejax.diagnosis.periodogram import lines
+from tissuejax.effects.material_test import MaterialTest
+from tissuejax.energies.energy import Energy
+from tissuejax.experiments.catalogue import experiment
+from tissuejax.experiments.homogeneous import nominal_stress
+from tissuejax.model import Model
+from tissuejax.recordings.recording import Sample
+
+MEMORIES = ("viscoelasticity", "softening")
+STEP = 1e-6  # of a parameter's scale
+
+
+@partial(jax.jit, static_argnums=0)
+def _predict(model: Model, theta: Float[Array, " p"], test: MaterialTest) -> Float[Array, "n ..."]:
+    return nominal_stress(model, dict(zip(model.declared, theta)), test)
+
+
+def lengthened(test: MaterialTest) -> MaterialTest:
+    """`test` with its last sample repeated up to 1024, 2048, ... samples: few lengths, few compilations."""
+    extra = max(1024, 2 ** math.ceil(math.log2(len(test.time)))) - len(test.time)
+
+    def longer(series: np.ndarray) -> np.ndarray:
+        return np.concatenate([series, np.repeat(series[-1:], extra, axis=0)])
+
+    arrays = {name: getattr(test, name) for name in test.__dataclass_fields__}
+    return MaterialTest(**{**arrays, "time": longer(test.time), "drive": longer(test.drive)})
+
+
+class MaterialBench(Bench):
+    """Material tests of one sample; see `Bench`."""
+
+    @classmethod
+    def of(
+        cls,
+        sample: Sample,
+        energy: Energy,
+        fitted: tuple[str, ...],
+        held_out: tuple[str, ...],
+        sigma: Mapping[str, float],
+        names: Sequence[str] | None = None,
+    ) -> "MaterialBench":
+        """The bench of `sample` with base model `energy`.
+
+        Args:
+            sigma: noise standard deviation of each recording, Pa.
+            names: effects to try; all that act in material tests by default.
+        """
+        recordings = (*fitted, *held_out)
+        tests = {
+            n: lengthened(experiment(sample.recordings[n].experiment).test(sample.recordings[n])) for n in recordings
+        }
+        segments, ys, sigmas, at = [], [], [], 0
+        for n in recordings:
+            r = sample.recordings[n]
+            values = np.asarray(r.channels["nominal_stress"].values, float)
+            drive = np.asarray(r.inputs["shear" if "shear" in r.inputs else "stretch"], float)
+            two = values.ndim == 2
+            for i in range(values.shape[1] if two else 1):
+                y = values[:, i] if two else values
+                rows = slice(at, at + len(y))
+                at = rows.stop
+                time, seen = np.asarray(r.inputs["time"], float), drive[:, i] if two else drive
+                kind = "shear" if "shear" in r.inputs else "stretch"
+                axis = f"axis {i + 1}" if two else ""
+                segments.append(Segment(n, "nominal_stress", axis, rows, time, "Pa", seen, kind, "1"))
+                ys.append(y)
+                sigmas.append(np.full(len(y), sigma[n]))
+        bench = cls(
+            segments=segments,
+            y=np.concatenate(ys),
+            sigma=np.concatenate(sigmas),
+            fitted=fitted,
+            held_out=held_out,
+            base=(),
+            free={},
+            start={},
+            candidates={},
+        )
+        bench._tests = tests
+        bench._of = {n: [s for s in segments if s.recording == n] for n in recordings}
+        strain = max(float(np.max(np.abs(np.log(s.drive) if s.drive_name == "stretch" else s.drive))) for s in segments)
+        scale = 0.5 * float(np.quantile(np.abs(bench.y), 0.98)) * strain
+        found = [e for e in entries(scale or 1.0, strain or 1.0) if names is None or e.title in names]
+        bench._declare(energy, found)
+        return bench
+
+    def _declare(self, energy: Energy, found: list[Entry]) -> None:
+        recordings = (*self.fitted, *self.held_out)
+        self._energy, self._entries = energy, found
+        self._built: dict[tuple[str, ...], tuple[Model, dict]] = {}
+        self._dear = {e.effect.name for e in found if e.dear}
+        heavy = self._dear.union(MEMORIES)
+        self._heavy = {f"effects.{e.effect.name}.": e.effect.name for e in found if e.effect.name in heavy}
+        whole = Model(energy, None, tuple(e.effect for e in found)).across(recordings)
+        self._neutral = {p: d.default for p, d in whole.declared.items()}
+        for entry in found:
+            self._neutral |= {f"effects.{entry.effect.name}.{k}": v for k, v in entry.effect.neutral.items()}
+        for path, p in whole.declared.items():
+            if path.startswith("energy.") and not p.frozen:
+                self.free[path] = Free(p.lower, p.upper, p.typical, p.unit)
+                self.start[path] = p.default
+        self.base = tuple(self.free)
+        for entry in found:
+            free, start, candidates = entry.declare(whole, self.fitted, self.held_out)
+            self.free.update(free)
+            self.start.update(start)
+            self.candidates.update({c.key: c for c in candidates})
+
+    def _model(self, values: Mapping[str, float], paths: Sequence[str] = ()) -> tuple[Model, dict]:
+        """The model for a set of moving paths, with the sources of its values.
+
+        Everything that costs nothing at once, and of the others those that take part.
+        """
+        key = tuple(sorted({d for p in (*values, *paths) for prefix, d in self._heavy.items() if p.startswith(prefix)}))
+        if key not in self._built:
+            light = [e.effect for e in self._entries if e.effect.name not in self._heavy.values()]
+            effects = (*light, *(e.effect for e in self._entries if e.effect.name in key))
+            model = Model(self._energy, None, effects)
+            sources = {n: [model.source_of(p, n) for p in model.declared] for n in self._tests}
+            self._built[key] = (model, sources)
+        return self._built[key]
+
+    def _theta(self, sources: dict, values: Mapping[str, float], name: str) -> np.ndarray:
+        whole = {**self._neutral, **values}
+        return np.array([next(whole[s] for s in source if s in whole) for source in sources[name]], float)
+
+    def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:
+        """See `Bench.predict`."""
+        model, sources = self._model(values)
+        out = self.y.copy()
+        for name in recordings or self._tests:
+            stress = np.asarray(_predict(model, self._theta(sources, values, name), self._tests[name]))
+            for s in self._of[name]:
+                part = stress[: len(s.time)]
+                out[s.rows] = part[:, int(s.component.split()[1]) - 1] if s.component else part
+        return out
+
+    def jacobian(
+        self, values: Mapping[str, float], paths: Sequence[str], recordings: Sequence[str] | None = None
+    ) -> Float[np.ndarray, "N k"]:
+        """See `Bench.jacobian`."""
+        at = {**{p: self.start[p] for p in paths}, **values}
+        origin, out = self.predict(at, recordings), np.empty((len(self.y), len(paths)))
+        for i, p in enumerate(paths):
+            f = self.free[p]
+            h = STEP * (abs(at[p]) if f.log else max(f.scale, abs(at[p])))
+            h = -h if at[p] + h > f.upper else h
+            out[:, i] = (self.predict({**at, p: at[p] + h}, recordings) - origin) / h
+        return out
+
+    def columns(
+        self, values: Mapping[str, float], settings: Sequence[tuple[Mapping[str, float], str]]
+    ) -> Float[np.ndarray, "N k"]:
+        """See `Bench.columns`. Shapes of different effects don't meet while amplitudes are neutral: they share a run."""
+        groups: dict[tuple, tuple[dict, list[int]]] = {}
+        for i, (setting, path) in enumerate(settings):
+            heavy = tuple(d for prefix, d in self._heavy.items() if path.startswith(prefix))
+            number = 0
+            while True:
+                merged, members = groups.setdefault((heavy, number), ({}, []))
+                if all(merged.get(k, v) == v for k, v in setting.items()):
+                    merged.update(setting)
+                    members.append(i)
+                    break
+                number += 1
+        out = np.empty((len(self.y), len(settings)))
+        for merged, members in groups.values():
+            unique = list(dict.fromkeys(settings[i][1] for i in members))
+            jac = self.jacobian({**values, **merged}, unique, self.fitted)
+            for i in members:
+                out[:, i] = jac[:, unique.index(settings[i][1])]
+        return out
+
+    def settings(self, candidate: Candidate, prediction: Float[np.ndarray, " N"]) -> Sequence[Mapping[str, float]]:
+        """Frequencies are read from the periodogram of the residual; see `Bench.settings`."""
+        if candidate.name != "periodic":
+            return candidate.grid
+        series = [
+            ((s.time - s.time[0]), (self.y - prediction)[s.rows] / self.sigma[s.rows])
+            for s in self.segments
+            if s.recording in self.fitted
+        ]
+        return [{"effects.periodic.frequency": f} for f in lines(series, 3)]

@@ -1,0 +1,170 @@
+"""The diagnosis as data: what `result.json` holds, and what the page and the tables are made from."""
+
+import math
+from dataclasses import dataclass
+from importlib.metadata import version
+
+import numpy as np
+
+from tissuejax.diagnosis.decide import Verdict
+from tissuejax.diagnosis.locate import locate
+from tissuejax.diagnosis.refit import Refit
+from tissuejax.diagnosis.remainder import remainder
+from tissuejax.diagnosis.search import Search, best_of_each
+
+
+@dataclass
+class Diagnosis:
+    """A finished diagnosis.
+
+    Attributes:
+        sample, energy: what was diagnosed with which base model.
+        search: everything tried.
+        verdict: the answer.
+        seconds: wall time.
+    """
+
+    sample: str
+    energy: str
+    search: Search
+    verdict: Verdict
+    seconds: float
+
+    def as_dict(self) -> dict:
+        """`result.json`."""
+        v, s = self.verdict, self.search
+        bench = s.bench
+        return {
+            "verdict": v.kind,
+            "confidence": v.confidence,
+            "reasons": list(v.reasons),
+            "effects": self.effects(v.chosen) if v.kind in ("found", "ambiguous") else [],
+            "best_attempt": self.effects(v.chosen) if v.kind == "unexplained" else [],
+            "alternatives": self.alternatives(),
+            "located": [x.as_dict() for x in locate(bench, s.empty.prediction)],
+            "candidates": self.candidates(),
+            "before": self.errors(s.empty),
+            "after": self.errors(v.chosen),
+            "base_parameters": self.base(),
+            "noise": {c: {"correlated_share": n.share, "correlation": n.rho} for c, n in s.misfit.noises.items()},
+            "explained": {"fitted": v.explained[0], "held_out": v.explained[1] if bench.held_out else None},
+            "fitted": list(bench.fitted),
+            "held_out": list(bench.held_out),
+            "sample": self.sample,
+            "energy": self.energy,
+            "warnings": list(bench.warnings),
+            "seconds": self.seconds,
+            "versions": {name: version(name) for name in ("tissuejax", "jax", "numpy", "scipy")},
+        }
+
+    def effects(self, r: Refit) -> list[dict]:
+        """Effects of a fit in the order in which they were added, with parameters, standard errors and units."""
+        out, free = [], self.search.bench.free
+        for key in r.keys:
+            c = self.search.bench.candidates[key]
+            parameters = {
+                p: {"value": r.all[p], "std": r.std.get(p), "unit": free[p].unit, "at_bound": p in r.at_bound}
+                for p in (*c.paths, *c.held)
+                if p in r.all
+            }
+            out.append({"name": c.name, "form": c.form, "parameters": parameters})
+        return out
+
+    def alternatives(self) -> list[dict]:
+        """Sets that these data can't tell from the chosen one."""
+        candidates = self.search.bench.candidates
+        return [
+            {
+                "effects": [candidates[k].name for k in r.keys],
+                "forms": list(r.keys),
+                "criterion_above_chosen": self.search.criterion(r) - self.search.criterion(self.verdict.chosen),
+                "parameters": self.effects(r),
+            }
+            for r in self.verdict.rivals
+        ]
+
+    def candidates(self) -> list[dict]:
+        """Every effect tried: score at the base fit, best refit alone, in the chosen company, correlation."""
+        s = self.search
+        first = {x.key: x for x in s.scored.get(frozenset(), [])}
+        directions = {k: x.direction for k, x in first.items() if np.any(x.direction)}
+        out = []
+        for key, c in s.bench.candidates.items():
+            x, alone = first.get(key), s.refits.get(frozenset({key}))
+            if x is None and alone is None:
+                continue
+            near = {
+                k: float(abs(directions[key] @ d))
+                for k, d in directions.items()
+                if key in directions and s.bench.candidates[k].name != c.name
+            }
+            closest = max(near, key=near.get) if near else None
+            out.append(
+                {
+                    "name": c.name,
+                    "form": c.form,
+                    "score": x.gain if x else None,
+                    "score_share": x.share if x else None,
+                    "refit_chi2_per_sample": alone.chi2 / alone.n if alone else None,
+                    "criterion": s.criterion(alone) - s.criterion(s.empty) if alone else None,
+                    "held_out_chi2_per_sample": alone.held / alone.n_held if alone and alone.n_held else None,
+                    "most_like": closest,
+                    "correlation": near.get(closest) if closest else None,
+                    "chosen": key in self.verdict.chosen.keys,
+                }
+            )
+        return sorted(out, key=lambda c: c["criterion"] if c["criterion"] is not None else math.inf)
+
+    def sets(self, most: int = 10) -> list[dict]:
+        """The best sets of effects with what they reach."""
+        s = self.search
+        best = min(s.criterion(r) for r in s.refits.values())
+        return [
+            {
+                "effects": list(s.refits[k].keys),
+                "criterion": s.criterion(s.refits[k]) - best,
+                "chi2_per_sample": s.refits[k].chi2 / s.refits[k].n,
+                "held_out_chi2_per_sample": s.refits[k].held / s.refits[k].n_held if s.refits[k].n_held else None,
+            }
+            for k in best_of_each(s)[:most]
+        ]
+
+    def errors(self, r: Refit) -> dict:
+        """Per recording and channel: rmse, unit, chi-square per sample, number of samples, fitted or held out."""
+        bench, out = self.search.bench, {}
+        left = bench.y - r.prediction
+        for name in (*bench.fitted, *bench.held_out):
+            channels = {}
+            for channel in dict.fromkeys(s.channel for s in bench.segments if s.recording == name):
+                own = [s for s in bench.segments if s.recording == name and s.channel == channel]
+                e = np.concatenate([left[s.rows] for s in own])
+                z = np.concatenate([left[s.rows] / bench.sigma[s.rows] for s in own])
+                channels[channel] = {
+                    "rmse": float(np.sqrt(np.mean(e**2))),
+                    "unit": own[0].unit,
+                    "chi2_per_sample": float(np.mean(z**2)),
+                    "n": len(e),
+                    "role": "held out" if name in bench.held_out else "fitted",
+                }
+            out[name] = channels
+        return out
+
+    def base(self) -> dict:
+        """Base parameters before and after."""
+        bench, before, after = self.search.bench, self.search.empty, self.verdict.chosen
+        return {
+            p: {
+                "before": before.values[p],
+                "before_std": before.std.get(p),
+                "after": after.values[p],
+                "after_std": after.std.get(p),
+                "unit": bench.free[p].unit,
+            }
+            for p in bench.base
+        }
+
+    def remainders(self) -> list[dict]:
+        """What the chosen model leaves, as smooth functions, channel by channel."""
+        bench = self.search.bench
+        kinds = dict.fromkeys((s.channel, s.component) for s in bench.segments if "marker" not in s.component)
+        return [remainder(bench, self.verdict.chosen.prediction, c, k).as_dict() for c, k in kinds]

@@ -1,0 +1,227 @@
+"""The search: score, refit every nominee, extend the best few sets, drop what is no longer needed.
+
+Greedy forward selection fails where two effects mask each other, so a beam of the best sets is kept at every size, every
+one scored anew at its own fit. A set reached once is never refitted. The noise is estimated anew from the
+best fit so far, since correlation can only be seen once the smooth mismatch is gone, and then all is compared
+under that one noise.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tissuejax.diagnosis.bench import Bench, Candidate
+from tissuejax.diagnosis.misfit import Misfit, estimated, white
+from tissuejax.diagnosis.quality import quality
+from tissuejax.diagnosis.refit import Refit, refit
+from tissuejax.diagnosis.score import Score, scores
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How much a search may spend.
+
+    Attributes:
+        most: effects in a set at most.
+        beam: sets extended at each size, by size.
+        nominees: effects refitted at each extension of one set, by size.
+        share: least share of the excess that a nominee's linear step must explain.
+        starts: settings of the shapes tried in a refit.
+        iterations: of a refit.
+    """
+
+    most: int = 3
+    beam: tuple[int, ...] = (1, 3, 1)
+    nominees: tuple[int, ...] = (9, 4, 3)
+    share: float = 0.02
+    starts: int = 2
+    iterations: int = 30
+
+
+@dataclass
+class Search:
+    """All that a search has seen.
+
+    Attributes:
+        refits: by set of keys.
+        scored: scores at each set that was extended.
+        misfit: noise under which the refits are compared.
+    """
+
+    bench: Bench
+    misfit: Misfit
+    budget: Budget
+    refits: dict[frozenset, Refit] = field(default_factory=dict)
+    scored: dict[frozenset, list[Score]] = field(default_factory=dict)
+    report: Callable[[str], None] = lambda _: None
+
+    @property
+    def empty(self) -> Refit:
+        """The fit of the base model alone."""
+        return self.refits[frozenset()]
+
+    def penalty(self, r: Refit) -> float:
+        """What r's parameters cost: Schwarz's, with the number of independent samples."""
+        inside, outside = (max(self.misfit.effective(x), 3.0) for x in (self.bench.fitted, self.bench.held_out))
+        return r.k * math.log(inside) + len(r.own) * math.log(outside)
+
+    def criterion(self, r: Refit) -> float:
+        """chi-square fitted + penalty + chi-square held out: the smaller the better.
+
+        The first two are Schwarz's criterion; the third is minus twice the log predictive density of recordings that took no
+        part in the fit, up to a constant, so the sum is one evidence-like number.
+        """
+        return r.chi2 + self.penalty(r) + r.held
+
+    def names(self, keys: frozenset) -> frozenset:
+        """Effects in a set, whatever their form."""
+        return frozenset(self.bench.candidates[k].name for k in keys)
+
+    def score(self, keys: frozenset) -> list[Score]:
+        """Scores of everything that may be added to the set, at its own fit."""
+        if keys not in self.scored:
+            at, names = self.refits[keys], self.names(keys)
+            left = [c for c in self.bench.candidates.values() if c.name not in names and c.nominated]
+            self.scored[keys] = scores(self.bench, self.misfit, at.values, tuple(at.values), left)
+        return self.scored[keys]
+
+    def nominees(self, keys: frozenset, most: int) -> list[Score]:
+        """The best forms of the effects that promise most for their parameters."""
+        parent = self.refits[keys]
+        price = math.log(max(self.misfit.effective(self.bench.fitted), 3.0))
+        least = self.budget.share * (parent.chi2 - parent.n)
+        worth = {
+            s.key: s.gain - price * len(self.bench.candidates[s.key].paths) for s in self.score(keys) if s.gain > least
+        }
+        out, count = [], {}
+        for s in sorted(self.score(keys), key=lambda s: -worth.get(s.key, -math.inf)):
+            name = self.bench.candidates[s.key].name
+            if worth.get(s.key, -1.0) <= 0 or count.get(name, 0) >= 2 or (name not in count and len(count) >= most):
+                continue
+            count[name] = count.get(name, 0) + 1
+            out.append(s)
+        return out
+
+    def extend(self, keys: frozenset, score: Score) -> frozenset:
+        """Refit of the set with one candidate more, from its most promising settings; remembered."""
+        key = keys | {score.key}
+        if key not in self.refits:
+            parent = self.refits[keys]
+            candidate = self.bench.candidates[score.key]
+            starts = [
+                {**parent.values, **setting, **inside(self.bench, candidate, step, setting, parent.values)}
+                for _, step, setting in distinct(score, self.budget.starts)
+            ]
+            self.report(" + ".join([*parent.keys, score.key]))
+            self.refits[key] = self.best((*parent.keys, score.key), starts)
+        return key
+
+    def reshape(self, keys: frozenset) -> None:
+        """Try every effect of a set in its neighbouring forms, as long as that lowers the criterion."""
+        at = keys
+        for _ in range(4):
+            parent, trials = self.refits[at], []
+            for old in parent.keys:
+                for new in self.bench.candidates[old].beside:
+                    key = at - {old} | {new}
+                    if key not in self.refits:
+                        self.report(" + ".join([new if k == old else k for k in parent.keys]))
+                        starts = [{**parent.values, **setting} for setting in self.bench.candidates[new].grid]
+                        order = tuple(new if k == old else k for k in parent.keys)
+                        self.refits[key] = self.best(order, starts[: self.budget.starts])
+                    trials.append(key)
+            best = min([at, *trials], key=lambda k: self.criterion(self.refits[k]))
+            if best == at:
+                return
+            at = best
+
+    def best(self, keys: tuple[str, ...], starts: list[Mapping[str, float]]) -> Refit:
+        """The best of several starts, each given a few iterations before the winner is finished."""
+        if len(starts) > 1:
+            tries = [refit(self.bench, self.misfit, keys, s, iterations=5, final=False) for s in starts]
+            starts = [min(tries, key=lambda t: t.chi2).values]
+        return refit(self.bench, self.misfit, keys, starts[0], iterations=self.budget.iterations)
+
+    def again(self, keys: frozenset) -> Refit:
+        """Refit of a set under the present noise, from where it was."""
+        old = self.refits[keys]
+        self.refits[keys] = refit(self.bench, self.misfit, old.keys, old.values, iterations=self.budget.iterations)
+        return self.refits[keys]
+
+
+def inside(
+    bench: Bench, candidate: Candidate, step: Mapping[str, float], setting: Mapping[str, float], values: Mapping
+) -> dict[str, float]:
+    """Amplitudes after the linear step, pulled inside their bounds: a step is trusted only so far."""
+    out = {}
+    for path in candidate.amplitudes:
+        free = bench.free[path]
+        origin = {**bench.start, **values, **setting}[path]
+        low, high = max(free.lower, origin - 30 * free.scale), min(free.upper, origin + 30 * free.scale)
+        value = float(np.clip(origin + step[path], low, high))
+        if value in (free.lower, free.upper) and math.isfinite(free.upper - free.lower):
+            value = 0.9 * value + 0.1 * origin if value != origin else value
+        out[path] = value
+    return out
+
+
+def distinct(score: Score, most: int) -> list[tuple[float, dict, dict]]:
+    """The best settings whose gains are worth a start of their own."""
+    kept = list(score.settings[:1])
+    for trial in score.settings[1:]:
+        if len(kept) >= most or trial[0] < 0.5 * kept[0][0]:
+            break
+        kept.append(trial)
+    return kept
+
+
+def search(bench: Bench, budget: Budget | None = None, report: Callable[[str], None] | None = None) -> Search:
+    """Fit the base, then grow sets of candidates as the budget allows; see the module's text."""
+    budget = budget or Budget()
+    s = Search(bench, white(bench), budget, report=report or (lambda _: None))
+    s.report("base model")
+    first = refit(bench, s.misfit, (), {}, iterations=60, final=False)
+    s.misfit = estimated(bench, bench.predict(first.values))
+    s.refits[frozenset()] = refit(bench, s.misfit, (), first.values, iterations=60)
+    for size in range(budget.most):
+        at = [k for k in best_of_each(s) if len(k) == size][: budget.beam[min(size, len(budget.beam) - 1)]]
+        grown = [
+            s.extend(keys, score)
+            for keys in at
+            for score in s.nominees(keys, budget.nominees[min(size, len(budget.nominees) - 1)])
+        ]
+        if not grown:
+            break
+        if size == 0:
+            renew_noise(s)
+        for keys in best_of_each(s)[:2]:
+            s.reshape(keys)
+        best = min(s.refits.values(), key=s.criterion)
+        if len(best.keys) <= size or quality(s, best).noise:
+            break
+    return s
+
+
+def best_of_each(s: Search) -> list[frozenset]:
+    """The best form of every set of effects, best first."""
+    out: dict[frozenset, frozenset] = {}
+    for keys in sorted(s.refits, key=lambda k: s.criterion(s.refits[k])):
+        out.setdefault(s.names(keys), keys)
+    return list(out.values())
+
+
+def renew_noise(s: Search) -> None:
+    """Estimate the noise again from the best fit so far; if it has changed, refit everything under it."""
+    best = min(s.refits.values(), key=s.criterion)
+    now = estimated(s.bench, best.prediction)
+    changed = any(
+        abs(now.noises[c].share - n.share) > 0.1 or abs(now.noises[c].rho - n.rho) > 0.05
+        for c, n in s.misfit.noises.items()
+    )
+    if changed:
+        s.misfit = now
+        s.scored.clear()
+        for keys in list(s.refits):
+            s.again(keys)
