@@ -1,9 +1,9 @@
 """From effects to candidates: which parameters an effect frees, where its shapes are scanned, which bounds hold.
 
 Most effects are one candidate. Some come in forms, from spare to rich (one relaxation time, two, three; one offset for
-all recordings or one each), all under one name: a spare form is nominated, and where it stands it is tried with its richer and
-its poorer neighbour, so that a law that differs from ours bends the effect's own form before another effect
-is called to help.
+all recordings or one each), all under one name: a spare form is nominated, and where it stands it is tried with its
+richer and its poorer neighbour, so that a law that differs from ours bends the effect's own form before another
+effect is called to help.
 """
 
 import itertools
@@ -67,7 +67,7 @@ class Entry:
         prefix = f"effects.{self.effect.name}"
         known = {p.name: p for p in self.effect.parameters}
         free, start, candidates = {}, {}, []
-        for i, form in enumerate(self.forms):
+        for form in self.forms:
             amplitudes, shapes, held, paths = [], [], [], {}
             for name in form.free:
                 p, shape = known[name], name not in self.effect.amplitudes

@@ -1,12 +1,12 @@
 """From a search to a verdict: nothing missing, found, ambiguous, or unexplained.
 
 Order of the questions, each with its own number:
-1. Is anything missing? The base fit's whitened chi-square and correlation against pure noise, in every recording, and whether
-   any set lowers the criterion by more than `GAIN`.
+1. Is anything missing? The base fit's whitened chi-square and correlation against pure noise, in every recording,
+   and whether any set lowers the criterion by more than `GAIN`.
 2. Which set? The smallest criterion; then every effect is asked whether it is needed: its removal must cost more than
    `GAIN` and a share `NEEDED` of the misfit, or reach noise level where the smaller set doesn't.
-3. Does it explain? What is left must be noise, or at most a share `LEFT` of what was missing, in the fitted recordings and in
-   the held-out ones. Otherwise something is missing that the catalogue has no name for.
+3. Does it explain? What is left must be noise, or at most a share `LEFT` of what was missing, in the fitted recordings
+   and in the held-out ones. Otherwise something is missing that the catalogue has no name for.
 4. Could it be another? Sets of no more effects whose criterion is within `CLOSE` can't be told apart by these data.
 """
 

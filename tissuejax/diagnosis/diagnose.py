@@ -57,7 +57,8 @@ def diagnose(
     n = sum(len(s.time) for s in bench.segments if s.recording in fitted)
     if n <= len(bench.base):
         raise InputError(
-            f"{sample.name}: {n} samples for {len(bench.base)} parameters of {energy}; fit a smaller energy, or record more"
+            f"{sample.name}: {n} samples for {len(bench.base)} parameters of {energy}; "
+            "fit a smaller energy, or record more"
         )
     with (progress or Silent()).stage(f"diagnosing {sample.name}") as stage:
         found = search(bench, budget, lambda note: stage.advance(note=note))

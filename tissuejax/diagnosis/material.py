@@ -1,13 +1,13 @@
 """The bench of material tests: one compiled model with every effect in it, all neutral until freed.
 
 Compilation would cost more than all the numerics, so no candidate gets a program of its own: the model holds all
-effects of the catalogue, and a set of candidates is a choice of which parameters move. Time series are padded, everything
-else is an argument: one program for a prediction, whatever the sample. Effects with memory, and those that turn a
-prediction into a search (fibres, compressibility, a compliant rig), join the model only where they are freed.
+effects of the catalogue, and a set of candidates is a choice of which parameters move. Time series are padded,
+everything else is an argument: one program for a prediction, whatever the sample. Effects with memory, and those that
+turn a prediction into a search (fibres, compressibility, a compliant rig), join the model only where they are freed.
 
-Derivatives are one-sided differences in double precision (relative error 1e-6; a test holds them against forward mode): a
-prediction takes about a millisecond, so they cost as much as forward mode to run, and nothing to compile, where
-the linearised program takes three times as long to compile as the prediction.
+Derivatives are one-sided differences in double precision (relative error 1e-6; a test holds them against forward
+mode): a prediction takes about a millisecond, so they cost as much as forward mode to run, and nothing to compile,
+where the linearised program takes three times as long to compile as the prediction.
 """
 
 import math
@@ -173,7 +173,7 @@ class MaterialBench(Bench):
     def columns(
         self, values: Mapping[str, float], settings: Sequence[tuple[Mapping[str, float], str]]
     ) -> Float[np.ndarray, "N k"]:
-        """See `Bench.columns`. Shapes of different effects don't meet while amplitudes are neutral: they share a run."""
+        """See `Bench.columns`. Shapes of different effects don't meet at neutral amplitudes: they share a run."""
         groups: dict[tuple, tuple[dict, list[int]]] = {}
         for i, (setting, path) in enumerate(settings):
             heavy = tuple(d for prefix, d in self._heavy.items() if path.startswith(prefix))

@@ -1,4 +1,4 @@
-"""Lines in the spectrum of several series with phases of their own: least squares of sine and cosine at each frequency."""
+"""Lines in the spectrum of several series with phases of their own: least squares of a sinusoid at each frequency."""
 
 from collections.abc import Sequence
 

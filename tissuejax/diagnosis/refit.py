@@ -106,7 +106,7 @@ class Descent:
     def run(self, x: np.ndarray, iterations: int, tolerance: float) -> tuple[np.ndarray, float, np.ndarray, bool]:
         """From x to (x, cost, prediction, converged).
 
-        A Jacobian costs many predictions, so while steps do what they promised it is only corrected along them (Broyden).
+        A Jacobian costs many predictions, so it is only corrected along steps that keep their promise (Broyden).
         """
         cost, r, prediction = self.objective(x)
         damping, small, jac, age = 1e-3, 0, None, 0

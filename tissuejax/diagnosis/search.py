@@ -1,7 +1,7 @@
 """The search: score, refit every nominee, extend the best few sets, drop what is no longer needed.
 
-Greedy forward selection fails where two effects mask each other, so a beam of the best sets is kept at every size, every
-one scored anew at its own fit. A set reached once is never refitted. The noise is estimated anew from the
+Greedy forward selection fails where two effects mask each other, so a beam of the best sets is kept at every size,
+every one scored anew at its own fit. A set reached once is never refitted. The noise is estimated anew from the
 best fit so far, since correlation can only be seen once the smooth mismatch is gone, and then all is compared
 under that one noise.
 """
@@ -70,8 +70,8 @@ class Search:
     def criterion(self, r: Refit) -> float:
         """chi-square fitted + penalty + chi-square held out: the smaller the better.
 
-        The first two are Schwarz's criterion; the third is minus twice the log predictive density of recordings that took no
-        part in the fit, up to a constant, so the sum is one evidence-like number.
+        The first two are Schwarz's criterion; the third is minus twice the log predictive density of recordings that
+        took no part in the fit, up to a constant, so the sum is one evidence-like number.
         """
         return r.chi2 + self.penalty(r) + r.held
 
