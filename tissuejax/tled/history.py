@@ -6,7 +6,6 @@ none; Holzapfel 2000, 6.10; Simo 1987), and S = (1 - d) S0 with d = amount (1 - 
 """
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -30,27 +29,23 @@ class Damage(eqx.Module):
     recoverable: Float[Array, ""] | None = None
     growth: Float[Array, ""] | float = 0.0
 
-    def factor(self, greatest: Float[Array, " E"], psi: Float[Array, " E"]) -> Float[Array, " E"]:
-        """1 - d, from the greatest energy so far and the energy now, Pa."""
-        kept = 1.0 - self.amount * (1.0 - jnp.exp(-greatest / self.scale))
-        if self.recoverable is None:
-            return kept
-        below = jax.scipy.special.erf((greatest - psi) / (self.scale + self.growth * greatest))
-        return kept * (1.0 - self.recoverable * below)
+    def loss(self, greatest: Float[Array, " E"]) -> Float[Array, " E"]:
+        """d, from the greatest energy so far, Pa."""
+        return self.amount * (1.0 - jnp.exp(-greatest / self.scale))
 
 
-def relax(prony: Prony, q: list, S0: tuple, step: Float[Array, ""]) -> tuple[list, tuple]:
-    """One step of every Prony term: q <- q + (1 - exp(-h/tau)) (S0 - q), S = S0 - sum_i g_i q_i.
+def relax(prony: Prony, q: list, instant: tuple, step: Float[Array, ""]) -> tuple[list, tuple]:
+    """One step of every Prony term, q <- q + (1 - exp(-h/tau)) (S0 - q); the new q and the stress gone, sum_i g_i q_i.
 
     Args:
         q: for each term, six arrays (E,), the part of the stress that has relaxed.
-        S0: instantaneous isochoric stress, six arrays.
+        instant: instantaneous isochoric stress S0, six arrays.
         step: h, on the clock on which `tau` is given.
     """
-    S, new = list(S0), []
+    gone, new = (0.0,) * 6, []
     for i, term in enumerate(q):
         share = -jnp.expm1(-step / prony.tau[i])
-        term = tuple(old + share * (s - old) for old, s in zip(term, S0, strict=True))
-        S = [s - prony.g[i] * t for s, t in zip(S, term, strict=True)]
+        term = tuple(old + share * (s - old) for old, s in zip(term, instant, strict=True))
+        gone = tuple(g + prony.g[i] * t for g, t in zip(gone, term, strict=True))
         new.append(term)
-    return new, tuple(S)
+    return new, gone

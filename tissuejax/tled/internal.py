@@ -144,32 +144,24 @@ def stress(scene: Scene, mesh: Mesh, C: Sym, history: History, step) -> tuple[tu
     For elements with averaged pressure the isochoric part only.
     """
     tissue, averaged = scene.tissue, scene.body.element.averaged_pressure
-    if tissue.prony is None and tissue.damage is None and tissue.drain is None and not averaged:
-        return second_piola(jax.grad(lambda C: jnp.sum(mesh.stiffness * energy_density(scene, C)))(C)), history
-    psi, S = isochoric(scene, mesh, C)
-    relaxed, greatest, drained = history
+    if averaged:
+        S = isochoric(scene, mesh, C)[1]
+    else:
+        S = second_piola(jax.grad(lambda C: jnp.sum(mesh.stiffness * energy_density(scene, C)))(C))
+    if tissue.prony is None and tissue.damage is None:
+        return S, history
+    S = barrier(S)  # what memory takes away is subtracted from exactly the stress without it: neutral to the last bit
+    psi, instant = isochoric(scene, mesh, barrier(C))
+    relaxed, greatest = history
     if tissue.damage is not None:
         greatest = jnp.maximum(greatest, psi)
-        bare = jnp.where(mesh.stiffness > 0, mesh.stiffness, 1.0)
-        factor = tissue.damage.factor(greatest / bare, psi / bare)
-        S = tuple(factor * s for s in S)
+        loss = tissue.damage.loss(greatest / jnp.where(mesh.stiffness > 0, mesh.stiffness, 1.0))
+        S = tuple(s - loss * i for s, i in zip(S, instant, strict=True))
+        instant = tuple(i - loss * i for i in instant)
     if tissue.prony is not None:
-        relaxed, S = relax(tissue.prony, relaxed, S, step)
-    if not averaged:
-        U = _volumetric_gradient(scene, mesh, C)
-        if tissue.drain is not None:
-            drained, U = relax(tissue.drain, drained, U, step)
-        S = tuple(s + p for s, p in zip(S, U, strict=True))
-    return S, History(relaxed, greatest, drained)
-
-
-def _volumetric_gradient(scene, mesh, C):
-    tissue = scene.tissue
-
-    def total(C):
-        return jnp.sum(mesh.stiffness * tissue.volumetric.energy(tissue.volumetric_values, Strain.of(C).J))
-
-    return second_piola(jax.grad(total)(C))
+        relaxed, gone = relax(tissue.prony, relaxed, instant, step)
+        S = tuple(s - g for s, g in zip(S, gone, strict=True))
+    return S, History(relaxed, greatest)
 
 
 def averaged_pressure(scene: Scene, mesh: Mesh, F) -> tuple[Float[Array, " E"], Float[Array, " N"]]:

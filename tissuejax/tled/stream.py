@@ -42,7 +42,7 @@ def run_to_file(scene: Scene, path: str | Path, progress: Progress = SILENT, chu
 
     Args:
         scene: frames are rounded up to whole chunks.
-        path: `/channels/*` grow by frames, `/states/displacement/K` (N, 3) after chunk K, `/resume` holds the last state.
+        path: `/channels/*` grow by frames, `/states/displacement/K` (N, 3) after chunk K, `/resume` is the last state.
         progress: told after each chunk.
         chunks: stop after so many (None: to the end).
 
@@ -126,9 +126,8 @@ def to_xdmf(path: str | Path, target: str | Path) -> Path:
         f"{item(f'states/displacement/{k}', points, 'Float')}</Attribute></Grid>"
         for k, t in enumerate(times)
     )
-    target.write_text(
-        f'<Xdmf Version="3.0"><Domain><Grid GridType="Collection" CollectionType="Temporal">{grids}</Grid></Domain></Xdmf>'
-    )
+    series = f'<Grid GridType="Collection" CollectionType="Temporal">{grids}</Grid>'
+    target.write_text(f'<Xdmf Version="3.0"><Domain>{series}</Domain></Xdmf>')
     return target
 
 
