@@ -62,6 +62,30 @@ def test_fit_writes_everything(capsys, tmp_path):
     assert not list(tmp_path.glob(".*")), "a temporary file was left"
 
 
+def test_every_sample_of_a_file_in_one_table(capsys, tmp_path):
+    table = "specimen,stretch,stress\n" + "".join(
+        f"{name},{l},{mu * (l - l**-2)}\n" for name, mu in (("a", 3.0), ("b", 5.0)) for l in (1.0, 1.1, 1.2, 1.3)
+    )
+    (tmp_path / "lab.csv").write_text(table)
+    (tmp_path / "lab.toml").write_text(
+        """file = "lab.csv"
+sample = "{specimen}"
+recording = "pull"
+experiment = "uniaxial"
+[columns]
+stretch = { column = "stretch" }
+nominal_stress = { column = "stress", unit = "kPa" }
+"""
+    )
+    argv = ["fit", str(tmp_path / "lab.toml"), "--each", "--energy", "neo-hookean", "--out", str(tmp_path / "out")]
+    code, record = answer(capsys, *argv)
+    assert code == 0
+    assert record["fits"]["a"]["energy.mu"] == pytest.approx(3000.0, rel=1e-6)
+    assert record["fits"]["b"]["energy.mu"] == pytest.approx(5000.0, rel=1e-6)
+    assert (tmp_path / "out" / "fits.csv").read_text().count("\n") == 3
+    assert json.loads((tmp_path / "out" / "b" / "result.json").read_text())["status"] == "converged"
+
+
 def test_sensitivity_of_a_result_and_of_a_published_material(capsys, tmp_path):
     out = str(tmp_path)
     main(["fit", ELASTIC, *YEOH, "--only", "tension", "--out", out, "--multistart", "1"])

@@ -9,8 +9,10 @@ from tissuejax.commands.arguments import add_fit, add_model, fit_options
 from tissuejax.commands.command import Command, Reply
 from tissuejax.fitting.result import Fit
 from tissuejax.progress import for_terminal
-from tissuejax.recordings.files import read
+from tissuejax.recordings.files import read, read_all
 from tissuejax.report import sentences
+from tissuejax.report.page import write_fit
+from tissuejax.storage import write_text
 
 
 class FitCommand(Command):
@@ -28,6 +30,7 @@ into --out: result.json (every number), report.html (one page to read and keep) 
 
   tissuejax fit liver.h5 --energy reduced-polynomial-2 --holdout r3 --out out/liver
   tissuejax fit rubber.toml --energy ogden-3 --ogden-form mu/alpha --out out/rubber
+  tissuejax fit specimens.toml --each --energy reduced-polynomial-3          every sample of a file, one table
   tissuejax fit skin.toml --energy demiray+fibre --fix "energy.kappa=0.1" --bounds "energy.k2=0:50"
 
 Exit code 0: done; 2: the input can't be used (the message says why); 3: the search did not converge (what was found is
@@ -41,10 +44,13 @@ written all the same, with a warning on top).
         )
         add_model(parser)
         add_fit(parser)
+        parser.add_argument("--each", action="store_true", help="fit every sample of FILE for itself, numbers only")
         parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="where to write (default: out/SAMPLE)")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Read, fit, write."""
+        if given.each:
+            return self._each(given)
         sample = read(given.file)
         model = verbs.material(
             given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
@@ -52,6 +58,31 @@ written all the same, with a warning on top).
         found = verbs.fit(sample, model, progress=for_terminal(), **fit_options(given, model.parameters))
         written = verbs.write(found, given.out or Path("out") / sample.name)
         return reply(found, written)
+
+    def _each(self, given: argparse.Namespace) -> Reply:
+        """Every sample of a file: result.json for each, one table of all parameters."""
+        samples, out = read_all(given.file), given.out or Path("out") / Path(given.file).stem
+        rows, code, progress = {}, 0, for_terminal()
+        with progress.stage(f"{given.energy} on {len(samples)} samples", len(samples)) as stage:
+            for name, sample in samples.items():
+                model = verbs.material(
+                    given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
+                ).across(tuple(sample.recordings))
+                found = verbs.fit(sample, model, **fit_options(given, model.parameters))
+                write_fit(found, out / name, pictures=False)
+                rows[name] = {"status": found.status, "chi2_per_dof": found.chi2_per_dof}
+                rows[name] |= {path: found.values[path] for path in found.free}
+                rows[name] |= {f"std {path}": found.std[path] for path in found.free}
+                code = max(code, 0 if found.converged else 3)
+                stage.advance(note=name)
+        columns = list(dict.fromkeys(column for row in rows.values() for column in row))
+        lines = [",".join(["sample", *columns])]
+        lines += [",".join([name, *(str(row.get(c, "")) for c in columns)]) for name, row in rows.items()]
+        table = write_text(out / "fits.csv", "\n".join(lines) + "\n")
+        good = sum(row["status"] == "converged" for row in rows.values())
+        return Reply(
+            {"fits": rows, "table": str(table)}, f"{good} of {len(rows)} samples converged; table {table}", code
+        )
 
 
 def reply(found: Fit, written: dict[str, Path]) -> Reply:

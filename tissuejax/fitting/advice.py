@@ -44,15 +44,16 @@ def warnings_of(found: "Fit") -> list[str]:
 
 
 def _misfit(found: "Fit") -> list[str]:
-    said = []
-    for key, s in found.channels.items():
-        if s.chi2_per_sample > MISFIT and key not in found.problem.noise.groups:
-            said.append(
-                f"{key}: the misfit is {math.sqrt(s.chi2_per_sample):.1f} times the noise (RMSE {s.rmse:.3g} "
-                f"{s.unit}): "
-                "the model lacks something. Standard errors were widened accordingly."
-            )
-    return said
+    groups = found.problem.noise.groups
+    bad = {k: math.sqrt(s.chi2_per_sample) for k, s in found.channels.items() if k not in groups}
+    bad = {k: times for k, times in bad.items() if times**2 > MISFIT}
+    if not bad:
+        return []
+    worst = sorted(bad, key=bad.get, reverse=True)
+    shown = ", ".join(f"{key} {bad[key]:.1f} times" for key in worst[:6]) + (", ..." if len(bad) > 6 else "")
+    return [
+        f"The misfit exceeds the noise ({shown}): the model lacks something. Standard errors were widened accordingly."
+    ]
 
 
 def _serial(found: "Fit") -> list[str]:

@@ -30,8 +30,8 @@ from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
 from tissuejax.progress import Progress, Silent
 
 METHOD = "sparing"
-# what is left to the limit, over the change just seen: the mesh error falls with h^2 and the final mesh is the finer one;
-# inertia with the compression squared, from f to f/2; the error of a penalty with its inverse, doubled
+# what is left to the limit, over the change just seen: the mesh error falls with h^2 and the final mesh is the finer
+# one; inertia with the compression squared, from f to f/2; the error of a penalty with its inverse, doubled
 REMAINS = {"mesh": 1 / (REFINED**2 - 1), "step": 4 / 3, "penalty": 2.0}
 
 
@@ -41,7 +41,7 @@ class ProbedFit:
 
     Attributes:
         fit: the result; its standard errors include the numerical part.
-        shifts: for each numerical choice ("mesh", "step", "penalty"), how far it holds each free parameter off its limit.
+        shifts: for each numerical choice ("mesh", "step", "penalty"), how far it holds a free parameter off its limit.
         numerical: root mean square numerical error of each "recording/channel", SI.
         noise_std: standard errors from noise alone.
         simulations: forward runs and Jacobians spent, a run being one recording set.
@@ -160,6 +160,8 @@ def fit_probed(
         method=METHOD,
     )
     found.warnings.extend(warnings_of(found))
+    if shifts:
+        found.warnings.append(_numerical_sentence(problem.free, shifts, noise_part))
     kept.done()
     noise_std = dict(zip(problem.free, map(float, noise_part.std), strict=True))
     return ProbedFit(found, shifts, sizes, noise_std, spent)
@@ -220,6 +222,14 @@ def _with_shifts(noise: Uncertainty, shifts: list[Float[np.ndarray, " p"]]) -> U
     covariance = noise.covariance + sum((np.outer(s, s) for s in shifts), np.zeros_like(noise.covariance))
     std = np.where(np.isfinite(noise.std), np.sqrt(np.diag(covariance)), np.inf)
     return Uncertainty(std, covariance, covariance / np.outer(std, std), noise.condition, noise.sentences)
+
+
+def _numerical_sentence(free, shifts, noise: Uncertainty) -> str:
+    parts = []
+    for i, path in enumerate(free):
+        total = sum(s[path] ** 2 for s in shifts.values()) ** 0.5
+        parts.append(f"{path.split('.')[-1]} {total:.3g} (noise {noise.std[i]:.3g})")
+    return f"Standard errors include what mesh, step and penalty leave open: {', '.join(parts)}."
 
 
 class Checkpoint:

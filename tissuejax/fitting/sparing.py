@@ -43,7 +43,7 @@ def sparing(
         y: start, in coordinates of order one (logarithms or scaled parameters).
         max_steps: Jacobians at most.
         fraction: converged once the next step is shorter than this many standard errors (scaled by the misfit).
-        longest: steps are shortened so that no coordinate moves farther.
+        longest: no coordinate moves farther in a step.
         on_accept: called with the number of runs, cost and point of every accepted step (progress, checkpoint).
 
     Raises:
@@ -72,12 +72,10 @@ def sparing(
         variance = max(2 * cost / max(len(r) - len(y), 1), 1e-300)
         accepted = False
         for _ in range(8):
-            # damping relative to the curvature of each coordinate: Marquardt's scaling
-            step = -np.linalg.lstsq(normal + damping * np.diag(size**2), gradient, rcond=1e-14)[0]
-            step *= min(1.0, longest / max(np.abs(step).max(), 1e-300))
+            step, damping, whole = _step(normal, gradient, size, damping, longest)
             errors = np.sqrt(step @ normal @ step / variance)
             promised = -(gradient @ step + 0.5 * step @ normal @ step)
-            if errors < fraction or promised < 1e-9 * cost:
+            if whole and (errors < fraction or promised < 1e-9 * cost):
                 return ended("converged")
             new = _trial(residuals, y + step)
             n += 1
@@ -90,12 +88,24 @@ def sparing(
         if not accepted:
             reason = "no nearby point is better, though the derivatives promise one"
             break
-        if (
-            errors < 0.5 and fraction >= 0.1
-        ):  # the Jacobian is as good here: one more chord step would be below 0.1 errors
+        if whole and errors < 0.5 and fraction >= 0.1:  # a further step would be shorter by far
             trace.append((cost, y))
             return ended("converged")
     return ended(reason or f"no convergence after {n} runs")
+
+
+def _step(normal, gradient, size, damping: float, longest: float):
+    """Damped step, its damping, and whether it is all but the Gauss-Newton step.
+
+    Damping is relative to the curvature of each coordinate (Marquardt) and grows until no coordinate moves farther than
+    `longest`, so that a direction hardly seen gives way before those that are seen.
+    """
+    first = damping
+    while True:
+        step = -np.linalg.lstsq(normal + damping * np.diag(size**2), gradient, rcond=1e-14)[0]
+        if np.abs(step).max() <= longest or damping > 1e8:
+            return step, damping, damping <= 1e-3 and damping == first
+        damping *= 3
 
 
 def _trial(residuals: Residuals, y: Float[np.ndarray, " p"]) -> Float[np.ndarray, " n"] | None:

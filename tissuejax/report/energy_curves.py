@@ -98,5 +98,5 @@ class EnergyCurves(Plot):
         right.axhspan(min(right.get_ylim()[0], -0.02 * biggest / factor), 0, color="#f6e0d8", zorder=0)
         right.set_xlabel("stretch")
         right.set_ylabel(f"least stiffness of Drucker's test ({unit})")
-        right.set_title("unstable where below zero", loc="left")
+        right.set_title("unstable where below zero", loc="left", fontsize=9.5, color=INK)
         return figure

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tissuejax.fitting.result import Fit
-from tissuejax.report.plot import HELD, MEASURED, MODEL, Plot, grid
+from tissuejax.report.plot import HELD, INK, MEASURED, MODEL, Plot, grid
 from tissuejax.report.scales import display, label
 from tissuejax.report.series import Curve, curves
 
@@ -49,6 +49,6 @@ def draw_curve(ax, curve: Curve) -> None:
     ax.plot(x[thin], curve.measured[thin] / factor, ".", color=MEASURED, markersize=3.5, alpha=0.7, zorder=2)
     if curve.predicted is not None:
         ax.plot(x, curve.predicted / factor, color=HELD if curve.held else MODEL, linewidth=1.5, zorder=3)
-    ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontweight="bold")
+    ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontsize=9.5, color=INK)
     ax.set_xlabel("time (s)" if by_time else curve.drive_name)
     ax.set_ylabel(f"{curve.channel.replace('_', ' ')}{label(unit)}")

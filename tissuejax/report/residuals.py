@@ -43,7 +43,7 @@ class Residuals(Plot):
             ax.axhspan(-1.96, 1.96, color="#e9edf0", zorder=0)
             ax.axhline(0, color=INK, linewidth=0.6)
             ax.plot(x[thin], r[thin], ".", color=HELD if curve.held else MODEL, markersize=3)
-            ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontweight="bold")
+            ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontsize=9.5, color=INK)
             ax.set_xlabel("time (s)" if by_time else curve.drive_name)
             ax.set_ylabel(f"{curve.channel.replace('_', ' ')}\nresidual / noise")
         return figure

@@ -65,7 +65,7 @@ class Sensitivities(Plot):
             for colour, (name, change) in zip(SERIES * 4, panel.change.items(), strict=False):
                 ax.plot(panel.x[order], change[order] / factor, color=colour, label=name, linewidth=1.4)
             ax.axhline(0, color=INK, linewidth=0.5)
-            ax.set_title(panel.title, loc="left")
+            ax.set_title(panel.title, loc="left", fontsize=9.5, color=INK)
             ax.set_xlabel(panel.x_label)
             ax.set_ylabel(f"theta dy/dtheta{label(unit)}")
         axes[0].legend(frameon=False, fontsize=8, ncols=2)

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tissuejax.fitting.sobol import Sobol
-from tissuejax.report.plot import SERIES, Plot, grid
+from tissuejax.report.plot import INK, SERIES, Plot, grid
 
 MOST = 6
 
@@ -39,6 +39,6 @@ class SobolBars(Plot):
             ax.barh(rows, np.clip(first, 0, None), color=SERIES[0], height=0.35)
             ax.set_yticks(rows, labels)
             ax.invert_yaxis()
-            ax.set_title(key, loc="left")
+            ax.set_title(key, loc="left", fontsize=9.5, color=INK)
             ax.set_xlabel("Sobol index")
         return figure

@@ -17,8 +17,8 @@ class Trace(Plot):
     order: ClassVar[int] = 90
 
     def prepare(self, subject: Fit) -> dict[str, np.ndarray] | None:
-        """Steps and ends; None for a fit without a trace."""
-        if not subject.trace:
+        """Steps and ends; None where nothing was searched (constants solved for at once)."""
+        if len(subject.trace) < 2:
             return None
         return {"steps": np.array([i.chi2 for i in subject.trace]), "ends": np.array(subject.starts, float)}
 
