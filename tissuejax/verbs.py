@@ -18,6 +18,7 @@ from tissuejax.energies import catalogue as names
 from tissuejax.energies.energy import Energy
 from tissuejax.experiments.predictor import predictor
 from tissuejax.fitting.least_squares import fit as fit_problem
+from tissuejax.fitting.probed import fit_probed
 from tissuejax.fitting.result import Fit
 from tissuejax.fitting.setup import problem, split
 from tissuejax.model import Model
@@ -83,6 +84,7 @@ def fit(
     seed: int = 0,
     max_steps: int = 200,
     progress: Progress | None = None,
+    checkpoint: Path | None = None,
 ) -> Fit:
     """Estimate the parameters of a strain energy (and effects) from the recordings of a sample.
 
@@ -97,6 +99,10 @@ def fit(
         multistart, seed: number of starts and seed of those after the first.
         max_steps: evaluations for each start.
         progress: told after every accepted step.
+        checkpoint: for probings, a file that keeps the last iterate; a killed fit goes on from there.
+
+    Probings are fitted by `fitting.probed.fit_probed`: from one start, whatever `method` and `multistart` say, with a
+    volumetric energy K/2 (J-1)^2 if none is named.
 
     Returns:
         The fit: `values`, `std`, `channels`, `holdout`, `warnings`, `record()`.
@@ -108,6 +114,9 @@ def fit(
     if not isinstance(energy, Model):
         energy = material(energy, ogden_form=ogden_form, volumetric=volumetric, effects=effects)
     fitted, held = split(sample, tuple(only), tuple(holdout))
+    probing = all(sample.recordings[name].experiment == "probing" for name in fitted)
+    if probing and energy.volumetric is None:
+        energy = Model(energy.energy, names.volumetric("quadratic"), energy.effects)
     posed = problem(
         predictor(energy, sample, fitted),
         free=tuple(free) if free is not None else None,
@@ -121,6 +130,10 @@ def fit(
         stable=stable,
     )
     with (progress or Silent()).stage(f"fitting {energy.energy.name} to {sample.name}", None) as stage:
+        if probing:  # each run is a simulation: one start, few runs, errors that include the numerical one
+            return fit_probed(
+                posed, holdout=held, max_steps=min(max_steps, 12), progress=progress, checkpoint=checkpoint
+            ).fit
         return fit_problem(
             posed,
             start=dict(posed.start) if start else None,

@@ -6,6 +6,7 @@ none; Holzapfel 2000, 6.10; Simo 1987), and S = (1 - d) S0 with d = amount (1 - 
 """
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -29,9 +30,13 @@ class Damage(eqx.Module):
     recoverable: Float[Array, ""] | None = None
     growth: Float[Array, ""] | float = 0.0
 
-    def loss(self, greatest: Float[Array, " E"]) -> Float[Array, " E"]:
-        """d, from the greatest energy so far, Pa."""
-        return self.amount * (1.0 - jnp.exp(-greatest / self.scale))
+    def loss(self, greatest: Float[Array, " E"], psi: Float[Array, " E"]) -> Float[Array, " E"]:
+        """d, from the greatest energy so far and the energy now, Pa; exactly 0 at neutral."""
+        lost = self.amount * (1.0 - jnp.exp(-greatest / self.scale))
+        if self.recoverable is None:
+            return lost
+        below = jax.scipy.special.erf((greatest - psi) / (self.scale + self.growth * greatest))
+        return lost + self.recoverable * below * (1.0 - lost)
 
 
 def relax(prony: Prony, q: list, instant: tuple, step: Float[Array, ""]) -> tuple[list, tuple]:

@@ -148,20 +148,37 @@ def stress(scene: Scene, mesh: Mesh, C: Sym, history: History, step) -> tuple[tu
         S = isochoric(scene, mesh, C)[1]
     else:
         S = second_piola(jax.grad(lambda C: jnp.sum(mesh.stiffness * energy_density(scene, C)))(C))
-    if tissue.prony is None and tissue.damage is None:
+    if tissue.prony is None and tissue.damage is None and tissue.drain is None:
         return S, history
-    S = barrier(S)  # what memory takes away is subtracted from exactly the stress without it: neutral to the last bit
-    psi, instant = isochoric(scene, mesh, barrier(C))
-    relaxed, greatest = history
-    if tissue.damage is not None:
-        greatest = jnp.maximum(greatest, psi)
-        loss = tissue.damage.loss(greatest / jnp.where(mesh.stiffness > 0, mesh.stiffness, 1.0))
-        S = tuple(s - loss * i for s, i in zip(S, instant, strict=True))
-        instant = tuple(i - loss * i for i in instant)
-    if tissue.prony is not None:
-        relaxed, gone = relax(tissue.prony, relaxed, instant, step)
+    S, C = barrier((S, C))  # memory is subtracted from exactly the stress without it: neutral to the last bit
+    relaxed, greatest, drained = history
+    lost = []
+    if tissue.prony is not None or tissue.damage is not None:
+        psi, instant = isochoric(scene, mesh, C)
+        if tissue.damage is not None:
+            bare = jnp.where(mesh.stiffness > 0, mesh.stiffness, 1.0)
+            greatest = jnp.maximum(greatest, psi)
+            loss = tissue.damage.loss(greatest / bare, psi / bare)
+            lost.append(tuple(loss * i for i in instant))
+            instant = tuple(i - loss * i for i in instant)
+        if tissue.prony is not None:
+            relaxed, gone = relax(tissue.prony, relaxed, instant, step)
+            lost.append(gone)
+    if tissue.drain is not None and not averaged:
+        drained, gone = relax(tissue.drain, drained, _volumetric_gradient(scene, mesh, C), step)
+        lost.append(gone)
+    for gone in barrier(lost):
         S = tuple(s - g for s, g in zip(S, gone, strict=True))
-    return S, History(relaxed, greatest)
+    return S, History(relaxed, greatest, drained)
+
+
+def _volumetric_gradient(scene, mesh, C):
+    tissue = scene.tissue
+
+    def total(C):
+        return jnp.sum(mesh.stiffness * tissue.volumetric.energy(tissue.volumetric_values, Strain.of(C).J))
+
+    return second_piola(jax.grad(total)(C))
 
 
 def averaged_pressure(scene: Scene, mesh: Mesh, F) -> tuple[Float[Array, " E"], Float[Array, " N"]]:

@@ -1,0 +1,140 @@
+"""Three sites on one lobe with the source's in vivo models 1, 2, 3: ex vivo start, stress-curve iteration, gradients.
+
+tissuejax study fits/in-vivo-liver
+"""
+
+import time
+from pathlib import Path
+
+import jax
+import numpy as np
+
+from tissuejax.energies.catalogue import volumetric
+from tissuejax.energies.published import published
+from tissuejax.experiments.predictor import predictor
+from tissuejax.experiments.probing_settings import ProbingSettings
+from tissuejax.fitting.probed import fit_probed
+from tissuejax.fitting.setup import problem
+from tissuejax.fitting.stress_curve import errors, stress_curve
+from tissuejax.mesh.columns import Lobe, columns
+from tissuejax.model import Model
+from tissuejax.progress import for_terminal
+from tissuejax.recordings.recording import Channel, Recording, Sample
+from tissuejax.storage import write_json
+
+jax.config.update("jax_enable_x64", True)
+
+SITES = {
+    "site 1": ("in-vivo-1", (-0.014, -0.008)),
+    "site 2": ("in-vivo-2", (0.013, -0.006)),
+    "site 3": ("in-vivo-3", (0.0, 0.012)),
+}
+START = "ex-vivo-ogden"
+K = 20e3  # Pa, taken as known
+RADIUS, SPEED, DEPTH = 4.75e-3, 1.25e-3, 4.0e-3  # m, m/s, m: the source's 9.5 mm tip
+FORCE_NOISE, MARKER_NOISE = 2e-3, 2.5e-4  # N and m: the source's sensors
+FORCE_RATE, MARKER_RATE = 62.5, 15.0
+TRUTH = ProbingSettings(counts=(16, 16, 7), compression=4.0, interval=0.032, step=2.0e-4, penalty=6e8, hourglass=0.2)
+FIT = ProbingSettings(counts=(12, 12, 5), compression=5.0, interval=0.032, step=2.5e-4, processes=1)
+PUBLISHED = {"site 1": (0.420, 0.030), "site 2": (0.170, 0.015), "site 3": (0.080, 0.025)}
+
+
+def lobe() -> Lobe:
+    """A dome of 70 x 60 x 22 mm with a slanting top."""
+    s = np.linspace(0, 1, 41)
+    a, b = np.meshgrid(2 * s - 1, 2 * s - 1, indexing="ij")
+    top = 0.022 * (0.45 + 0.55 * ((1 - a**2) * (1 - b**2)) ** 0.5) * (1 + 0.06 * a)
+    return Lobe.of_grid(s, s, 0.035 * a * (1 - 0.12 * b**2), 0.030 * b * (1 - 0.12 * a**2), np.zeros_like(top), top)
+
+
+def rig(body: Lobe, name: str, place: tuple[float, float]) -> Recording:
+    """Down at 1.25 mm/s, a short hold, up; markers around the site; no measurement yet."""
+    height = float(body.top.ev(*body.parameters_of(np.array(place))))
+    down = (DEPTH + 1e-3) / SPEED
+    t = np.arange(0, 2 * down + 0.9, 0.01)
+    z = (
+        height
+        + RADIUS
+        + np.interp(t, [0, 0.3, 0.3 + down, 0.6 + down, 0.6 + 2 * down], [1e-3, 1e-3, -DEPTH, -DEPTH, 1e-3])
+    )
+    path = np.stack([np.full_like(t, place[0]), np.full_like(t, place[1]), z], 1)
+    angle = np.arange(7) * 2 * np.pi / 7
+    around = (
+        np.array(place)
+        + np.stack([np.cos(angle), np.sin(angle)], 1) * np.array([7e-3, 1.05e-2])[np.arange(7) % 2][:, None]
+    )
+    dots = np.array([[*xy, body.top.ev(*body.parameters_of(xy))] for xy in around])
+    ft, mt = np.arange(0.016, t[-1], 1 / FORCE_RATE), np.arange(0.02, t[-1], 1 / MARKER_RATE)
+    channels = {
+        "force": Channel(ft, np.zeros((len(ft), 3)), "N", FORCE_NOISE),
+        "markers": Channel(mt, np.tile(dots, (len(mt), 1, 1)), "m", MARKER_NOISE),
+    }
+    return Recording(name, "probing", {"probe/time": t, "probe/position": path}, channels, {"probe/radius": RADIUS})
+
+
+def measured(body: Lobe, name: str, rng: np.random.Generator) -> Sample:
+    """The recording of one site: finer mesh, smaller steps, another penalty, noise of the sensors."""
+    truth, place = SITES[name]
+    blank = Sample("lobe", {name: rig(body, name, place)}, columns(body, (16, 14, 6)), 1060.0)
+    entry = published(truth)
+    model = Model(entry.energy, volumetric("quadratic"))
+    values = {f"energy.{k}": v for k, v in entry.constants.items()} | {"volumetric.K": K}
+    told = predictor(model, blank, settings=TRUTH).predict(values)[name]
+    noisy = {
+        c: Channel(
+            ch.time,
+            np.asarray(told.channels[c].values) + rng.normal(0, ch.noise_std, ch.values.shape),
+            ch.unit,
+            ch.noise_std,
+        )
+        for c, ch in blank.recordings[name].channels.items()
+    }
+    old = blank.recordings[name]
+    return Sample("lobe", {name: Recording(name, "probing", old.inputs, noisy, old.attributes)}, blank.geometry, 1060.0)
+
+
+def study_site(body: Lobe, name: str, rng: np.random.Generator) -> dict:
+    """One row of the table."""
+    sample = measured(body, name, rng)
+    entry = published(START)
+    model = Model(entry.energy, volumetric("quadratic"))
+    start = {f"energy.{k}": float(v) for k, v in entry.constants.items()} | {"volumetric.K": K}
+    p = predictor(model, sample, settings=FIT)
+    begun = time.perf_counter()
+    _, turns = stress_curve(p, name, start)
+    manual = time.perf_counter() - begun
+    posed = problem(p, start=start, free=tuple(k for k in start if k.startswith("energy.mu")))
+    found = fit_probed(posed, numerical=False, finish=False, max_steps=8, fraction=0.3, progress=for_terminal())
+    after = errors(sample.recordings[name], found.fit.predictions[name])
+    return {
+        "truth": SITES[name][0],
+        "ex_vivo": {"force_N": turns[0].force_rmse, "marker_m": turns[0].marker_rmse},
+        "stress_curve": {
+            "force_N": turns[-1].force_rmse, "marker_m": turns[-1].marker_rmse, "simulations": len(turns), "seconds": manual,
+            "turns": [{"force_N": t.force_rmse, "marker_m": t.marker_rmse, "stable": t.stable} for t in turns],
+        },
+        "gradients": {
+            "force_N": after[0], "marker_m": after[1], "simulations": found.simulations, "seconds": found.fit.seconds,
+            "status": found.fit.status, "values": found.fit.values, "std": found.fit.std,
+            "trace": [i.chi2 / posed.n_samples for i in found.fit.trace],
+        },
+        "published": {"ex_vivo_N": PUBLISHED[name][0], "stress_curve_N": PUBLISHED[name][1]},
+    }  # fmt: skip
+
+
+def main(folder: Path) -> str:
+    """Write result.json; returns the answer in a sentence."""
+    rng, body = np.random.default_rng(2012), lobe()
+    rows = {}
+    for name in SITES:
+        rows[name] = study_site(body, name, rng)
+        write_json(folder / "result.json", rows)
+        print(name, {k: (v["force_N"], v["marker_m"]) for k, v in rows[name].items() if "force_N" in v}, flush=True)
+    best = [r["gradients"]["force_N"] for r in rows.values()]
+    manual = [r["stress_curve"]["force_N"] for r in rows.values()]
+    listed = [", ".join(f"{x:.4f}" for x in values) for values in (best, manual)]
+    return f"force RMSE by gradients {listed[0]} N, by the stress curve {listed[1]} N"
+
+
+if __name__ == "__main__":
+    print(main(Path(__file__).parent))
