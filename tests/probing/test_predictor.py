@@ -9,9 +9,9 @@ import pytest
 from tests.probing.bench import BODY, MARKERS, QUICK, VALUES, model, recording, sample
 from tissuejax.effects.catalogue import effects, suited
 from tissuejax.errors import InputError, UnstableSimulation
-from tissuejax.experiments import programs
+from tissuejax.experiments import programs, workers
 from tissuejax.experiments.predictor import predictor
-from tissuejax.experiments.probing import assembled
+from tissuejax.experiments.probing import Simulated, assembled
 from tissuejax.experiments.probing_predictor import ProbingPredictor, _linearised, _vector
 from tissuejax.experiments.probing_sensors import rest_positions
 from tissuejax.experiments.probing_settings import ProbingSettings
@@ -122,14 +122,34 @@ def test_derivatives_equal_difference_quotients():
         assert error < 1e-4, (name, error)  # friction has kinks of its own
 
 
-def test_jacobian_has_a_column_for_each_path_and_zero_where_it_does_not_act(base):
+def test_jacobian_has_a_column_for_each_path_and_zero_where_it_does_not_act(monkeypatch):
+    """The bookkeeping of columns, recordings and programs, with a stand-in for the simulation."""
     two = sample(recording("a"), recording("b", place=(-0.004, 0.004)))
     p = predictor(model(suited("drift", "probing", separate=True)), two, settings=QUICK)
-    _, slopes = p.jacobian(VALUES, ["effects.drift.offset_z.a"])
-    column = slopes["effects.drift.offset_z.a"]
-    assert np.allclose(column["a"]["force"], [0, 0, 1])
-    assert not np.any(column["b"]["force"])
-    assert not np.any(column["a"]["markers"])
+    sizes = []
+
+    def stand_in(jobs, processes):
+        out = []
+        for _, _, _, setup, basis in jobs:
+            sizes.append(len(basis))
+            shapes = {"force": (len(setup.force_times), 3), "markers": (len(setup.marker_times), 3, 3)}
+            run = Simulated({c: np.zeros(n) for c, n in shapes.items()}, -1, -1, 0.0, 0.0, 0.0)
+            slopes = {c: np.stack([np.full(n, np.flatnonzero(row)[0]) for row in basis]) for c, n in shapes.items()}
+            out.append((run, slopes))
+        return out
+
+    monkeypatch.setattr(workers, "run_all", stand_in)
+    axes = [f"effects.drift.{what}_{c}" for what in ("offset", "rate") for c in "xyz"]
+    paths = [f"{axis}.a" for axis in axes] + ["energy.C10", "effects.drift.offset_z.b"]
+    _, slopes = p.jacobian(VALUES, paths)
+    assert max(sizes) <= QUICK.tangents
+    assert sum(sizes) == 7 + 2
+    place = list(p.model.declared)
+    for path in paths:
+        generic = path.removesuffix(".a").removesuffix(".b")
+        for name in "ab":
+            acts = not path.endswith(f".{'b' if name == 'a' else 'a'}")
+            assert np.all(slopes[path][name]["force"] == (place.index(generic) if acts else 0)), (path, name)
 
 
 def test_it_is_a_pure_function_inside_other_transformations(base, plain):
