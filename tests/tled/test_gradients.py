@@ -73,6 +73,10 @@ def test_reverse_equals_forward(programs, memory):
 SLOTS = {
     "prony": {"tissue.prony": Prony(jnp.zeros(1), jnp.array([0.3]))},
     "damage": {"tissue.damage": Damage(jnp.asarray(0.0), jnp.asarray(50.0))},
+    "recoverable": {
+        "tissue.damage": Damage(jnp.asarray(0.0), jnp.asarray(50.0), jnp.asarray(0.0), jnp.asarray(0.1)),
+    },
+    "drain": {"tissue.drain": Prony(jnp.zeros(1), jnp.array([0.3]))},
     "friction": {"probe.friction": jnp.asarray(0.0)},
     "adhesion": {"probe.adhesion": jnp.asarray(0.0)},
     "offset": {"probe.offset": jnp.zeros(3)},

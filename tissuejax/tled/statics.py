@@ -20,7 +20,6 @@ from tissuejax.tled import capsule, contact, internal, stable, support
 from tissuejax.tled.scene import Scene
 from tissuejax.tled.simulate import COMPILER_OPTIONS, series
 
-MARGIN = 1.6  # fictitious mass over the estimate: large strains stiffen
 CHECK = 25  # iterations between two looks at the residual
 
 
@@ -78,8 +77,11 @@ def load(scene: Scene, time: float = 0.0) -> Load:
 def long_term(scene: Scene, mesh: internal.Mesh) -> internal.History:
     """An empty memory; with an infinite step every relaxation then ends at once."""
     tissue, zero = scene.tissue, jnp.zeros_like(mesh.stiffness)
-    relaxed = None if tissue.prony is None else [(zero,) * 6 for _ in range(len(tissue.prony.g))]
-    return internal.History(relaxed, None if tissue.damage is None else zero)
+
+    def empty(prony):
+        return None if prony is None else [(zero,) * 6 for _ in range(len(prony.g))]
+
+    return internal.History(empty(tissue.prony), None if tissue.damage is None else zero, empty(tissue.drain))
 
 
 def pull(at: Load, u: Float[Array, "3 N"]) -> tuple[Float[Array, "3 N"], Float[Array, "3 N"]]:
@@ -100,9 +102,9 @@ def unbalanced(at: Load, w: Float[Array, "3 N"]) -> Float[Array, "3 N"]:
     return jnp.where(at.held, w, inner - outer)
 
 
-def relax(at: Load, start: Float[Array, "3 N"], tolerance: float, most: int):
+def relax(at: Load, start: Float[Array, "3 N"], tolerance: float, most: int, margin: float):
     """Dynamic relaxation from `start`; (w, (relative residual, iterations))."""
-    mass = 0.25 * MARGIN * at.diagonal
+    mass = 0.25 * margin * at.diagonal
     free = ~at.held
 
     def one(_, state):
@@ -144,7 +146,9 @@ def tangent_solve(at: Load, apply, b: Float[Array, "3 N"], symmetric: bool = Tru
     return jax.lax.custom_linear_solve(apply, b, solve, solve, symmetric=symmetric)
 
 
-def equilibrium(scene: Scene, time: float = 0.0, tolerance: float = 1e-9, most: int = 20_000) -> Equilibrium:
+def equilibrium(
+    scene: Scene, time: float = 0.0, tolerance: float = 1e-9, most: int = 20_000, margin: float = 1.6
+) -> Equilibrium:
     """Static equilibrium of a scene under the loads at `time`. Pure JAX, differentiable both ways.
 
     Args:
@@ -153,6 +157,7 @@ def equilibrium(scene: Scene, time: float = 0.0, tolerance: float = 1e-9, most: 
         time: real time at which probe and support are looked up, s.
         tolerance: on the greatest unbalanced force over the greatest force.
         most: iterations after which it is given up (the displacement is NaN then; `checked` says so).
+        margin: fictitious mass over its estimate at rest; large strains stiffen and need more (4 at a stretch of 0.6).
     """
     scene = scene.cast(scene.body.points.dtype)
     at = load(scene, time)
@@ -160,7 +165,7 @@ def equilibrium(scene: Scene, time: float = 0.0, tolerance: float = 1e-9, most: 
     w, (residual, count) = jax.lax.custom_root(
         partial(unbalanced, at),
         first,
-        lambda _, start: relax(jax.lax.stop_gradient(at), start, tolerance, most),
+        lambda _, start: relax(jax.lax.stop_gradient(at), start, tolerance, most, margin),
         lambda apply, b: tangent_solve(jax.lax.stop_gradient(at), apply, b),
         has_aux=True,
     )
