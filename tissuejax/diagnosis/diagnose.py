@@ -5,6 +5,9 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import jax
+
+from tissuejax.cache import keep_programs
 from tissuejax.diagnosis.decide import decide
 from tissuejax.diagnosis.material import MaterialBench
 from tissuejax.diagnosis.result import Diagnosis
@@ -45,6 +48,8 @@ def diagnose(
         NotConverged: the base model can't be fitted at all.
     """
     begun = time.perf_counter()
+    jax.config.update("jax_enable_x64", True)
+    keep_programs()
     sample = source if isinstance(source, Sample) else read(source)
     fitted, held_out, remarks = split(sample, holdout)
     base = named_energy(energy, ogden_form)

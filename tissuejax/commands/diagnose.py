@@ -1,0 +1,65 @@
+"""`tissuejax diagnose`: what is missing in the model of a recording, where, and how sure."""
+
+import argparse
+from pathlib import Path
+from typing import ClassVar
+
+from tissuejax.commands.command import Command, Reply
+from tissuejax.diagnosis.diagnose import diagnose
+from tissuejax.progress import for_terminal
+from tissuejax.recordings.files import read
+from tissuejax.report import diagnosis_sentences as sentences
+from tissuejax.report.diagnosis_page import write_diagnosis
+
+
+class DiagnoseCommand(Command):
+    """Diagnose a sample and write result.json, report.html and figures."""
+
+    name: ClassVar[str] = "diagnose"
+    order: ClassVar[int] = 40
+    summary: ClassVar[str] = "find the physics that the model lacks: where it misses, which effect, how sure"
+    teaches: ClassVar[str] = """
+Ask what a model lacks to predict the recordings of a sample.
+
+The base model is fitted; what it leaves is compared with the noise (serial correlation included); every effect of the
+catalogue, of tissue, rig and sensor, is scored and refitted, alone and together; the held-out recording takes
+no part in any fit. The verdict is one of: nothing-missing, found, ambiguous (one of these, and the experiment that would
+tell), or unexplained (something is missing that no effect of the catalogue explains).
+
+  tissuejax diagnose liver.h5 --energy reduced-polynomial-2 --out out/liver
+  tissuejax diagnose muscle.toml --energy neo-hookean --holdout slow --holdout fast
+  tissuejax diagnose rubber.toml --energy ogden-3 --ogden-form mu/alpha --effect viscoelasticity --effect softening
+
+What is written into --out: result.json (every number), report.html (one page to read and keep), remainder.json (what is
+still left, as smooth functions of drive, rate and time) and the figures as PNG.
+"""
+
+    def arguments(self, parser: argparse.ArgumentParser) -> None:
+        """FILE, base model, hold-out and --out."""
+        parser.add_argument("file", metavar="FILE", help="recording file or side file; FILE#NAME for one of many")
+        parser.add_argument("--energy", required=True, metavar="NAME", help="base model: a strain energy by name")
+        parser.add_argument("--ogden-form", metavar="FORM", help="for ogden-N: which form the constants mean")
+        parser.add_argument(
+            "--holdout", action="append", metavar="NAME", help="recording to hold out (repeat); default: the last one"
+        )
+        parser.add_argument("--effect", action="append", metavar="NAME", help="try only these effects (repeat)")
+        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="where to write (default: out/SAMPLE)")
+
+    def run(self, given: argparse.Namespace) -> Reply:
+        """Read, diagnose, write."""
+        sample = read(given.file)
+        found = diagnose(
+            sample,
+            given.energy,
+            holdout=given.holdout,
+            progress=for_terminal(),
+            effects=given.effect,
+            ogden_form=given.ogden_form,
+        )
+        written = write_diagnosis(found, given.out or Path("out") / sample.name)
+        lines = [found.verdict.kind, "", sentences.lead(found), ""]
+        lines += [f"  {r['path']:<40}{r['value']:>24} {r['unit']:<6}{r['note']}" for r in sentences.parameters(found)]
+        lines += ["", *sentences.sure(found), ""]
+        lines += [f"page     {written['page']}", f"numbers  {written['result']}"]
+        record = found.as_dict() | {"files": {name: str(path) for name, path in written.items()}}
+        return Reply(record, "\n".join(lines))

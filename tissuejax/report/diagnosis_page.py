@@ -1,0 +1,41 @@
+"""The page of a diagnosis: for a colleague who was not there."""
+
+from pathlib import Path
+
+from tissuejax.diagnosis.result import Diagnosis
+from tissuejax.report import diagnosis_sentences as sentences
+from tissuejax.report.page import figures, render
+from tissuejax.storage import write_bytes, write_json, write_text
+
+
+def write_diagnosis(found: Diagnosis, out: Path) -> dict[str, Path]:
+    """result.json, remainder.json, report.html and one PNG a figure, each written whole or not at all.
+
+    Returns:
+        Paths by name: "result", "remainder", "page" and the figures.
+    """
+    out = Path(out)
+    record = found.as_dict()
+    written = {
+        "result": write_json(out / "result.json", record),
+        "remainder": write_json(out / "remainder.json", found.remainders()),
+    }
+    drawn = figures(found)
+    written |= {f["name"]: write_bytes(out / f"{f['name']}.png", f["png"]) for f in drawn}
+    page = render(
+        "diagnosis.html.j2",
+        title=f"Diagnosis of {found.sample}",
+        d=found,
+        record=record,
+        lead=sentences.lead(found),
+        sure=sentences.sure(found),
+        limits=sentences.limits(found),
+        parameters=sentences.parameters(found),
+        base=sentences.base(found),
+        places=sentences.places(found),
+        sets=found.sets(),
+        fits=len(found.search.refits),
+        figures=drawn,
+    )
+    written["page"] = write_text(out / "report.html", page)
+    return written
