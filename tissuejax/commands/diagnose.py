@@ -23,8 +23,8 @@ Ask what a model lacks to predict the recordings of a sample.
 
 The base model is fitted; what it leaves is compared with the noise (serial correlation included); every effect of the
 catalogue, of tissue, rig and sensor, is scored and refitted, alone and together; the held-out recording takes
-no part in any fit. The verdict is one of: nothing-missing, found, ambiguous (one of these, and the experiment that would
-tell), or unexplained (something is missing that no effect of the catalogue explains).
+no part in any fit. The verdict is one of: nothing-missing, found, ambiguous (one of these, and the experiment that
+would tell), or unexplained (something is missing that no effect of the catalogue explains).
 
   tissuejax diagnose liver.h5 --energy reduced-polynomial-2 --out out/liver
   tissuejax diagnose muscle.toml --energy neo-hookean --holdout slow --holdout fast

@@ -59,7 +59,7 @@ class DiagnosisResiduals(Plot):
     def caption(self, data: list[Pair]) -> str:
         """How to read it."""
         return (
-            "Measured minus predicted, in units of the noise. Grey: the base model alone. Blue (fitted) and orange (held "
+            "Measured minus predicted, in units of the noise. Grey: base model alone. Blue (fitted) and orange (held "
             "out, no part in any fit): with the effects of the verdict. Inside the pale band lies what noise alone "
             "gives. The thin line is what was done to the specimen."
         )

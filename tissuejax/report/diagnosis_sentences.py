@@ -36,7 +36,7 @@ def lead(d: Diagnosis) -> str:
             f"{joined(others, 'or')}. The first fits best ({after})."
         )
     return (
-        f"Something is missing that no effect of the catalogue explains (chi² per sample {chi:.2f} with {d.energy} alone). "
+        f"Something is missing that no effect of the catalogue explains ({d.energy} alone: chi² per sample {chi:.2f}). "
         + " ".join(f"{r[:1].upper()}{r[1:]}." for r in v.reasons)
     )
 
