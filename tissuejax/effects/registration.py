@@ -45,7 +45,7 @@ class Registration(Effect):
         aside = jnp.stack([zero + p["dx"], zero + p["dy"], zero])
         offset = aside if scene.probe.offset is None else scene.probe.offset + aside
         # the top stays where it was measured, everything below it moves down with the support
-        points = scene.body.points.at[:, 2].add(-test.below_top * p["thickness"])
+        points = scene.body.points.at[:, 2].add((-test.below_top * p["thickness"]).astype(scene.body.points.dtype))
         radius = scene.probe.shape.radius + p["radius"]
         return scene.put({"probe.offset": offset, "probe.shape.radius": radius, "body.points": points})
 
