@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
+from scipy.optimize import lsq_linear
 
 from tissuejax.errors import UnstableSimulation
 from tissuejax.fitting.levenberg_marquardt import Descent
@@ -72,7 +73,7 @@ def sparing(
         variance = max(2 * cost / max(len(r) - len(y), 1), 1e-300)
         accepted = False
         for _ in range(8):
-            step, damping, whole = _step(normal, gradient, size, damping, longest)
+            step, whole = _step(J, r, size, damping, longest)
             errors = np.sqrt(step @ normal @ step / variance)
             promised = -(gradient @ step + 0.5 * step @ normal @ step)
             if whole and (errors < fraction or promised < 1e-9 * cost):
@@ -94,18 +95,17 @@ def sparing(
     return ended(reason or f"no convergence after {n} runs")
 
 
-def _step(normal, gradient, size, damping: float, longest: float):
-    """Damped step, its damping, and whether it is all but the Gauss-Newton step.
+def _step(J, r, size, damping: float, longest: float):
+    """Damped step in the box |step_i| <= longest, and whether it is all but the Gauss-Newton step.
 
-    Damping is relative to the curvature of each coordinate (Marquardt) and grows until no coordinate moves farther than
-    `longest`, so that a direction hardly seen gives way before those that are seen.
+    Damping is relative to the curvature of each coordinate (Marquardt). In a box, unlike a ball, one coordinate that
+    wants to go far does not hold up the others.
     """
-    first = damping
-    while True:
-        step = -np.linalg.lstsq(normal + damping * np.diag(size**2), gradient, rcond=1e-14)[0]
-        if np.abs(step).max() <= longest or damping > 1e8:
-            return step, damping, damping <= 1e-3 and damping == first
-        damping *= 3
+    upper = np.linalg.qr(np.column_stack([J, r]), mode="r")  # p + 1 rows with the same normal equations
+    rows = np.vstack([upper[:, :-1], np.sqrt(damping) * np.diag(size)])
+    target = -np.concatenate([upper[:, -1], np.zeros(len(size))])
+    step = lsq_linear(rows, target, (-longest, longest)).x
+    return step, damping <= 1e-3 and bool((np.abs(step) < 0.99 * longest).all())
 
 
 def _trial(residuals: Residuals, y: Float[np.ndarray, " p"]) -> Float[np.ndarray, " n"] | None:
