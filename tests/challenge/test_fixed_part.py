@@ -17,7 +17,7 @@ CASES = {  # name: (number, category, which effect or stray comes first); sizes 
     "viscoelasticity": (13, "one", 0),
     "softening": (11, "one", 1),
     "slack": (30, "one", 10),
-    "aging": (12, "one", 6),
+    "aging": (23, "one", 6),
     "drift": (11, "one", 7),
     "warmed": (11, "unknown", 3),
 }

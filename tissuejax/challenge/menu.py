@@ -141,7 +141,7 @@ CATALOGUED: tuple[Choice, ...] = (
     ),
     Choice("compressibility", "bulk", 0.003, 0.35),
     Choice("compressibility", "drained", 0.003, 0.35, lambda rng, s: {"tau": _log(rng, 2.0, 10.0)}),
-    Choice("aging", "linear", 0.003, 0.9, _session),
+    Choice("aging", "linear", 0.003, 0.9, _session, plain=False),
     Choice("aging", "exponential", 0.003, 0.9, _session),
     Choice("aging", "settling", 0.003, 0.9, lambda rng, s: {"time": 0.3 * s.trials[-1].start}, plain=False),
     Choice("drift", "linear", 0.1, 60.0, _mix, "noise"),
