@@ -122,11 +122,13 @@ def study_site(body: Lobe, name: str, rng: np.random.Generator) -> dict:
         "truth": SITES[name][0],
         "ex_vivo": {"force_N": turns[0].force_rmse, "marker_m": turns[0].marker_rmse},
         "stress_curve": {
-            "force_N": turns[-1].force_rmse, "marker_m": turns[-1].marker_rmse, "simulations": len(turns), "seconds": manual,
+            "force_N": turns[-1].force_rmse, "marker_m": turns[-1].marker_rmse,
+            "simulations": len(turns), "seconds": manual,
             "turns": [{"force_N": t.force_rmse, "marker_m": t.marker_rmse, "stable": t.stable} for t in turns],
         },
         "gradients": {
-            "force_N": after[0], "marker_m": after[1], "simulations": found.simulations | {"scaling": 2}, "seconds": found.fit.seconds,
+            "force_N": after[0], "marker_m": after[1],
+            "simulations": found.simulations | {"scaling": 2}, "seconds": found.fit.seconds,
             "status": found.fit.status, "values": found.fit.values, "std": found.fit.std,
             "trace": [i.chi2 / posed.n_samples for i in found.fit.trace],
         },
