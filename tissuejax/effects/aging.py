@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.history import dying
 from tissuejax.effects.material_test import MaterialTest, Stress
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
@@ -31,15 +32,19 @@ class Aging(Effect):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         meaning = "relative change of stiffness a second"
-        return (Parameter("rate", "1/s", 0.0, lower=-1.0, upper=1.0, scale=1e-4, meaning=meaning),)
+        settling = "rate at which the drift dies out"
+        return (
+            Parameter("rate", "1/s", 0.0, lower=-1.0, upper=1.0, scale=1e-4, meaning=meaning),
+            Parameter("settling", "1/s", 0.0, lower=0.0, upper=1.0, scale=1e-3, frozen=True, meaning=settling),
+        )
 
     def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:
-        return state.scaled(jnp.exp(p["rate"] * (test.start + test.elapsed)))
+        return state.scaled(jnp.exp(p["rate"] * dying(test.start + test.elapsed, p["settling"])))
 
     def channels(
         self, p: Mapping[str, Array], test: ProbingTest, channels: Mapping[str, Channel]
     ) -> Mapping[str, Channel]:
         # a probe in given places: stiffness alone, of all the tissue alike, changes the force and no displacement
         seen = channels["force"]
-        factor = jnp.exp(p["rate"] * (test.start + seen.time))
+        factor = jnp.exp(p["rate"] * dying(test.start + seen.time, p["settling"]))
         return {**channels, "force": Channel(seen.time, factor[:, None] * seen.values, seen.unit, seen.noise_std)}

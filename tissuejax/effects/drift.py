@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.history import dying
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
@@ -55,12 +56,13 @@ class Drift(Effect):
         return (
             Parameter("offset", "Pa", 0.0, scale=10.0, each=each, meaning="zero error of the load cell"),
             Parameter("rate", "Pa/s", 0.0, scale=1.0, each=each, meaning="drift of the load cell"),
+            Parameter("settling", "1/s", 0.0, lower=0.0, upper=10.0, scale=0.1, frozen=True, meaning="dying out of it"),
         )
 
     def stress(
         self, p: Mapping[str, Array], test: MaterialTest, stress: Float[Array, "n ..."]
     ) -> Float[Array, "n ..."]:
-        drift = p["offset"] + p["rate"] * test.elapsed
+        drift = p["offset"] + p["rate"] * dying(test.elapsed, p["settling"])
         return stress + (drift if stress.ndim == 1 else drift[:, None])
 
     def channels(

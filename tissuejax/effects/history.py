@@ -43,3 +43,9 @@ def running_peak(s: Float[Array, "n ..."]) -> Float[Array, "n ..."]:
     now = jax.lax.stop_gradient(s)
     reached = now >= jax.lax.cummax(now)
     return s[jax.lax.cummax(jnp.where(reached, jnp.arange(len(s)), 0))]
+
+
+def dying(time: Float[Array, " n"], rate: Float[Array, ""]) -> Float[Array, " n"]:
+    """(1 - exp(-rate t))/rate: time as a drift feels it that dies out; t itself at rate 0."""
+    going = rate > 0
+    return jnp.where(going, -jnp.expm1(-rate * time) / jnp.where(going, rate, 1.0), time)

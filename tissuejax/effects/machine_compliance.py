@@ -37,17 +37,27 @@ class MachineCompliance(Effect):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         meaning = "displacement of the rig a newton"
-        return (Parameter("compliance", "m/N", 0.0, lower=0.0, upper=10.0, scale=1e-3, meaning=meaning),)
+        bend = "rig that stiffens: asinh(bend F)/bend gives way in place of F"
+        return (
+            Parameter("compliance", "m/N", 0.0, lower=0.0, upper=10.0, scale=1e-3, meaning=meaning),
+            Parameter("bend", "1/N", 0.0, lower=0.0, upper=1e4, scale=1.0, frozen=True, meaning=bend),
+        )
 
     def stretch(
         self, p: Mapping[str, Array], test: MaterialTest, drive: Float[Array, "n ..."], respond: Respond
     ) -> Float[Array, "n ..."]:
         ratio = test.area / test.height
-        share = p["compliance"] * jnp.where(jnp.isnan(ratio), 0.01, ratio)
+        ratio = jnp.where(jnp.isnan(ratio), 0.01, ratio)
+        share = p["compliance"] * ratio
+        area = jnp.where(jnp.isnan(test.area), 1e-4, test.area)
+        bent = p["bend"] > 0
+        bend = jnp.where(bent, p["bend"], 1.0) * area  # of the nominal stress
 
         def newton(x: Array, _: None) -> tuple[Array, None]:
             stress, slope = jax.jvp(respond, (x,), (jnp.ones_like(x),))
-            return x - (x + share * stress - drive) / (1 + share * slope), None
+            given = jnp.where(bent, jnp.arcsinh(bend * stress) / bend, stress)
+            slope = jnp.where(bent, slope / jnp.sqrt(1 + (bend * stress) ** 2), slope)
+            return x - (x + share * given - drive) / (1 + share * slope), None
 
         return jax.lax.scan(newton, drive, None, length=4)[0]
 

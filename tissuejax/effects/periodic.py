@@ -42,8 +42,8 @@ class Periodic(Effect):
 
     @property
     def amplitudes(self) -> tuple[str, ...]:
-        """Sine and cosine part; in a probing also those of twice the frequency."""
-        return ("sin", "cos") if self.kind == "homogeneous" else ("sin", "cos", "sin2", "cos2")
+        """Sine and cosine part, and those of twice the frequency."""
+        return ("sin", "cos", "sin2", "cos2")
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -59,6 +59,8 @@ class Periodic(Effect):
         return (
             Parameter("sin", "Pa", 0.0, scale=10.0, each=each, meaning="sine part of the load"),
             Parameter("cos", "Pa", 0.0, scale=10.0, each=each, meaning="cosine part of the load"),
+            Parameter("sin2", "Pa", 0.0, scale=10.0, each=each, meaning="sine of twice the frequency"),
+            Parameter("cos2", "Pa", 0.0, scale=10.0, each=each, meaning="cosine of that"),
             Parameter("frequency", "1/s", 0.25, lower=1e-4, upper=1e4, meaning="of the load"),
         )
 
@@ -67,6 +69,7 @@ class Periodic(Effect):
     ) -> Float[Array, "n ..."]:
         angle = 2 * jnp.pi * p["frequency"] * (test.elapsed if self.separate else test.start + test.elapsed)
         load = p["sin"] * jnp.sin(angle) + p["cos"] * jnp.cos(angle)
+        load = load + p["sin2"] * jnp.sin(2 * angle) + p["cos2"] * jnp.cos(2 * angle)
         return stress + (load if stress.ndim == 1 else load[:, None])
 
     def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:

@@ -15,7 +15,8 @@ from tissuejax.parameters import Parameter
 class PermanentSet(Effect):
     """Elastic strain = strain - amount (largest + smallest strain so far), strain being stretch - 1 or shear.
 
-    The stress-free length follows the extremes of the past, in tension and in compression alike.
+    The stress-free length follows the extremes of the past, in tension and in compression alike. Strain below
+    `threshold` leaves nothing behind (0 unless named).
 
     Revealed by stress of the opposite sign when the specimen is brought back to its first length, and by a shifted
     origin in later cycles. Blind: monotonic loading (the amount is then taken up by the stiffness).
@@ -32,11 +33,16 @@ class PermanentSet(Effect):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         meaning = "share of the largest past strain that stays"
-        return (Parameter("amount", "1", 0.0, lower=0.0, upper=0.9, scale=0.05, meaning=meaning),)
+        least = "strain that leaves nothing behind"
+        return (
+            Parameter("amount", "1", 0.0, lower=0.0, upper=0.9, scale=0.05, meaning=meaning),
+            Parameter("threshold", "1", 0.0, lower=0.0, upper=0.5, scale=0.02, frozen=True, meaning=least),
+        )
 
     def stretch(
         self, p: Mapping[str, Array], test: MaterialTest, drive: Float[Array, "n ..."], respond: Respond
     ) -> Float[Array, "n ..."]:
         strain = drive - test.rest
-        extremes = running_peak(jnp.maximum(strain, 0.0)) - running_peak(jnp.maximum(-strain, 0.0))
+        least = p["threshold"]
+        extremes = running_peak(jnp.maximum(strain - least, 0.0)) - running_peak(jnp.maximum(-strain - least, 0.0))
         return drive - p["amount"] * extremes

@@ -33,7 +33,11 @@ class PlatenFriction(Effect):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         meaning = "coefficient between platen and tissue"
-        return (Parameter("friction", "1", 0.0, lower=0.0, upper=2.0, scale=0.1, meaning=meaning),)
+        power = "power of 1/stretch with which the aspect grows: 1.5 keeps the volume"
+        return (
+            Parameter("friction", "1", 0.0, lower=0.0, upper=2.0, scale=0.1, meaning=meaning),
+            Parameter("flattening", "1", 1.5, lower=-1.0, upper=5.0, scale=0.5, frozen=True, meaning=power),
+        )
 
     def stress(
         self, p: Mapping[str, Array], test: MaterialTest, stress: Float[Array, "n ..."]
@@ -43,4 +47,4 @@ class PlatenFriction(Effect):
         aspect = test.diameter / test.height
         aspect = jnp.where(jnp.isnan(aspect), 1.0, aspect)
         squeezed = (test.drive < 1) * 2 * test.swell  # swell is 1/2 where the sides are free, else 0
-        return stress * (1 + squeezed * p["friction"] * aspect * test.drive**-1.5 / 3)
+        return stress * (1 + squeezed * p["friction"] * aspect * test.drive ** -p["flattening"] / 3)

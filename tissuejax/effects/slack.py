@@ -14,7 +14,8 @@ from tissuejax.parameters import Parameter
 class Slack(Effect):
     """Specimen's strain is the recorded one short of `gap`, to the side of its sign, and zero inside the gap.
 
-    strain is stretch - 1 or shear; play acts in tension and in compression alike.
+    strain is stretch - 1 or shear; play acts in tension and in compression alike. With `roundness` rho > 0 the onset is
+    gradual: gap (1 - exp(-(|strain|/gap)^(1/rho)))^rho is lost, a toe region of exponential form at 1.
 
     Revealed by no load around rest and a sharp onset. Blind: recordings that start beyond the gap (it is then an offset
     of the stretch). Source: ASTM D882, toe compensation.
@@ -31,11 +32,18 @@ class Slack(Effect):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         meaning = "strain before the specimen is loaded"
-        return (Parameter("gap", "1", 0.0, lower=0.0, upper=0.5, scale=0.01, meaning=meaning),)
+        return (
+            Parameter("gap", "1", 0.0, lower=0.0, upper=0.5, scale=0.01, meaning=meaning),
+            Parameter("roundness", "1", 0.0, lower=0.0, upper=2.0, scale=0.2, frozen=True, meaning="of the onset"),
+        )
 
     def stretch(
         self, p: Mapping[str, Array], test: MaterialTest, drive: Float[Array, "n ..."], respond: Respond
     ) -> Float[Array, "n ..."]:
         strain = drive - test.rest
         # Subtracted from the drive, not added to rest, so that no gap changes no bit.
-        return drive - jnp.sign(strain) * jnp.minimum(jnp.abs(strain), p["gap"])
+        size, gap, round_ = jnp.abs(strain), p["gap"], p["roundness"] > 0
+        power = 1 / jnp.where(round_, p["roundness"], 1.0)
+        far = jnp.minimum((jnp.maximum(size, 1e-12) / jnp.maximum(gap, 1e-12)) ** power, 50.0)
+        lost = jnp.where(round_, gap * (-jnp.expm1(-far)) ** (1 / power), jnp.minimum(size, gap))
+        return drive - jnp.sign(strain) * lost
