@@ -1,0 +1,97 @@
+"""Time of one explicit step by elements, energy and precision; memory of a large body. Run as a script.
+
+    OMP_NUM_THREADS=1 XLA_FLAGS=--xla_cpu_multi_thread_eigen=false python tests/bench/bench_step.py [--large]
+
+Prints a table and writes `results/step.json`: nanoseconds of CPU time an element and step, best of several, and ratios.
+The energies of one size take turns, so that a busy machine disturbs their ratio least.
+"""
+
+import json
+import os
+import platform
+import resource
+import sys
+import time
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from tissuejax.energies.reduced_polynomial import ReducedPolynomial
+from tissuejax.energies.volumetric import Quadratic
+from tissuejax.mesh.columns import box
+from tissuejax.tled import build
+from tissuejax.tled.simulate import compiled
+
+jax.config.update("jax_enable_x64", True)
+RESULTS = Path(__file__).parent / "results"
+VALUES = dict(C10=781.898, C20=-747.631, C30=426.135, C40=122.701)
+
+
+def cube(n: int, order: int, dtype, steps: int = 0):
+    """The gravity cube with n^3 hexes; about 20 million element steps in 20 frames."""
+    steps = steps or max(2, round(1e6 / n**3))
+    values = {f"C{i}0": VALUES[f"C{i}0"] for i in range(1, order + 1)}
+    scene = build.scene(
+        box((0.1, 0.1, 0.1), (n, n, n)), ReducedPolynomial(order=order), Quadratic(), values, dict(K=2000.0), 981.0,
+        np.arange(20) * 1e-3, gravity=(0, 0, -9.81),
+    )  # fmt: skip
+    step = float(scene.clock.step)
+    return scene.put({"clock.interval": jnp.asarray(steps * step), "clock.steps": steps}).cast(dtype)
+
+
+def cpu(program, *arguments) -> float:
+    """Seconds of CPU time of one call."""
+    start = time.process_time()
+    jax.block_until_ready(program(*arguments))
+    return time.process_time() - start
+
+
+def measure(scenes: dict, rounds: int = 5) -> dict:
+    """Best nanoseconds an element and step of each scene, taken in turns."""
+    best = dict.fromkeys(scenes, float("inf"))
+    for scene in scenes.values():
+        jax.block_until_ready(compiled(scene))
+    for _ in range(rounds):
+        for name, scene in scenes.items():
+            work = len(scene.body.cells) * scene.clock.frames * scene.clock.steps
+            best[name] = min(best[name], cpu(compiled, scene) / work * 1e9)
+    return best
+
+
+def machine() -> dict:
+    """Where the figures come from."""
+    return {"processor": platform.processor() or platform.machine(), "jax": jax.__version__, "load": os.getloadavg()[0]}
+
+
+def write(name: str, figures: dict) -> None:
+    """Print and store."""
+    RESULTS.mkdir(exist_ok=True)
+    text = json.dumps(figures | {"machine": machine()}, indent=1)
+    (RESULTS / f"{name}.json").write_text(text + "\n")
+    print(text)
+
+
+def main() -> None:
+    figures = {}
+    for n in (10, 20, 30):
+        scenes = {
+            "neo-Hookean float32": cube(n, 1, jnp.float32),
+            "N=4 float32": cube(n, 4, jnp.float32),
+            "neo-Hookean float64": cube(n, 1, jnp.float64),
+        }
+        best = measure(scenes)
+        figures[f"{n**3} hexes"] = {k: round(v, 1) for k, v in best.items()} | {
+            "N=4 over neo-Hookean": round(best["N=4 float32"] / best["neo-Hookean float32"], 3),
+            "float64 over float32": round(best["neo-Hookean float64"] / best["neo-Hookean float32"], 2),
+        }
+    if "--large" in sys.argv:
+        scene = cube(44, 1, jnp.float32, steps=2)
+        jax.block_until_ready(compiled(scene))
+        figures["85184 hexes"] = {"peak memory MiB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024}
+    write("step", {"unit": "ns of CPU time an element and step"} | figures)
+
+
+if __name__ == "__main__":
+    main()
