@@ -30,6 +30,7 @@ FLOORS = [
     {"verbs"},
     {"commands"},
     {"cli"},
+    {"__main__"},
 ]
 FLOOR_OF = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 FILES = sorted(p for p in ROOT.rglob("*.py"))
