@@ -1,8 +1,9 @@
-"""Ball pressed into a bonded disc of neo-Hookean tissue, against an independent implicit solver (`reference/README.md`).
+"""Ball pressed into a bonded disc of neo-Hookean tissue, against an independent implicit solver.
 
-Radius 4.75 mm, disc of radius 40 and height 20 mm, mu 1563.8 Pa, K 20 kPa; reference forces are mesh-converged to about
-0.5 % with augmented contact. One-point hexes with 3 x 3 contact points a facet come down to it from above as the mesh is
-refined. `fits/verification/indentation.json` holds the measured convergence; the slow test makes it anew.
+Radius 4.75 mm, disc of radius 40 and height 20 mm, mu 1563.8 Pa, K 20 kPa; the forces of `reference/README.md` are
+mesh-converged to about 0.5 % with augmented contact. One-point hexes with 3 x 3 contact points a facet come down to it
+from above as the mesh is refined. `fits/verification/indentation.json` holds the measured convergence; the slow test
+makes it anew.
 """
 
 import json
