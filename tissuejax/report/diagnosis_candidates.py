@@ -38,8 +38,8 @@ class DiagnosisCandidates(Plot):
     def caption(self, data: list[dict]) -> str:
         """How to read it."""
         return (
-            "Left: share of the misfit that one linear step beside the base removes (it nominates, it does not decide). "
-            "Right: chi² per sample after a full refit with that effect alone, fitted (dots) and held out (rings); the "
+            "Left: share of the misfit that one linear step beside the base removes (it nominates, it does not "
+            "decide). Right: chi² per sample after a full refit with that effect alone, fitted (dots) and held out (rings); the "
             "vertical lines are the base model, 1 is noise. Effects of the verdict in blue."
         )
 
