@@ -39,8 +39,8 @@ class DiagnosisCandidates(Plot):
         """How to read it."""
         return (
             "Left: share of the misfit that one linear step beside the base removes (it nominates, it does not "
-            "decide). Right: chi² per sample after a full refit with that effect alone, fitted (dots) and held out (rings); the "
-            "vertical lines are the base model, 1 is noise. Effects of the verdict in blue."
+            "decide). Right: chi² per sample after a full refit with that effect alone, fitted (dots) and held out "
+            "(rings); the vertical lines are the base model, 1 is noise. Effects of the verdict in blue."
         )
 
     def draw(self, data: list[dict]) -> Figure:
