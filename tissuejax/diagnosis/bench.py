@@ -110,6 +110,8 @@ class Bench(abc.ABC):
         free: every path that any refit may move.
         start: neutral values of all paths.
         candidates: by key.
+        warnings: sentences for the reader.
+        dear: True where a prediction is a simulation: noise is taken as recorded, and refits stop early.
     """
 
     segments: Sequence[Segment]
@@ -122,6 +124,7 @@ class Bench(abc.ABC):
     start: dict[str, float]
     candidates: dict[str, Candidate]
     warnings: list[str] = field(default_factory=list)
+    dear: bool = False
 
     @abc.abstractmethod
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:

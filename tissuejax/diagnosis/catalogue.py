@@ -14,11 +14,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tissuejax.diagnosis.bench import Candidate, Free
+from tissuejax.effects.aging import Aging
 from tissuejax.effects.catalogue import effects
 from tissuejax.effects.drift import Drift
 from tissuejax.effects.effect import Effect
 from tissuejax.effects.energy_form import EnergyForm
+from tissuejax.effects.machine_compliance import MachineCompliance
 from tissuejax.effects.nonlinear_viscosity import NonlinearViscosity
+from tissuejax.effects.periodic import Periodic
+from tissuejax.effects.permanent_set import PermanentSet
+from tissuejax.effects.platen_friction import PlatenFriction
+from tissuejax.effects.slack import Slack
 from tissuejax.effects.softening import Softening
 from tissuejax.effects.viscoelasticity import Viscoelasticity
 from tissuejax.model import Model
@@ -118,16 +124,30 @@ def limits(p: Parameter, shape: bool, grid: tuple[float, ...]) -> Free:
 TIMES = tuple(float(t) for t in np.geomspace(0.1, 60.0, 7))
 
 
-def entries(energy_scale: float, strain_scale: float) -> list[Entry]:
-    """All effects that act in material tests, in their forms.
+@dataclass(frozen=True)
+class Sizes:
+    """What a sample's recordings are like, so that shapes are scanned where they can be seen.
 
-    Args:
-        energy_scale: typical strain energy of the sample's recordings, Pa: damage scales are scanned around it.
-        strain_scale: largest |ln stretch|: exponents of exponential terms are scanned so that they bend within it.
+    Attributes:
+        energy: typical strain energy, Pa: damage scales are scanned around it.
+        strain: largest |ln stretch|: exponents of exponential terms bend within it.
+        force: largest force, N: a rig stiffens within it.
+        session: time from the first recording to the last, s: drifts die out within it.
+        recording: duration of one, s.
     """
+
+    energy: float
+    strain: float
+    force: float
+    session: float
+    recording: float
+
+
+def entries(sizes: Sizes) -> list[Entry]:
+    """All effects that act in material tests, in their forms."""
     pairs = {"tau1": (0.2, 0.6, 2.0), "tau2": (4.0, 12.0, 40.0)}
-    damage = {"m": tuple(energy_scale * x for x in (0.02, 0.1, 0.4))}
-    exponent = {"exponent": tuple(x / strain_scale**2 for x in (0.3, 1.5))}
+    damage = {"m": tuple(sizes.energy * x for x in (0.02, 0.1, 0.4))}
+    exponent = {"exponent": tuple(x / sizes.strain**2 for x in (0.3, 1.5))}
     special = {
         "viscoelasticity": (
             Viscoelasticity(terms=3),
@@ -151,6 +171,55 @@ def entries(energy_scale: float, strain_scale: float) -> list[Entry]:
                 Form("offset", ("offset",), {}),
                 Form("offset and rate", ("offset", "rate"), {}),
                 Form("each recording", ("offset", "rate"), {}, each=("offset", "rate")),
+                Form("dying", ("offset", "rate", "settling"), {"settling": (4 / sizes.recording,)}, nominated=False),
+            ),
+        ),
+        "periodic": (
+            Periodic(separate=True),
+            (
+                Form("", ("sin", "cos", "frequency"), {}, each=("sin", "cos")),
+                Form(
+                    "two harmonics",
+                    ("sin", "cos", "sin2", "cos2", "frequency"),
+                    {},
+                    nominated=False,
+                    each=("sin", "cos", "sin2", "cos2"),
+                ),
+            ),
+        ),
+        "permanent-set": (
+            PermanentSet(),
+            (
+                Form("", ("amount",), {}),
+                Form("with threshold", ("amount", "threshold"), {"threshold": (0.2 * sizes.strain,)}, nominated=False),
+            ),
+        ),
+        "slack": (
+            Slack(),
+            (
+                Form("", ("gap",), {}),
+                Form("rounded", ("gap", "roundness"), {"roundness": (0.4, 1.0)}, nominated=False),
+            ),
+        ),
+        "machine-compliance": (
+            MachineCompliance(),
+            (
+                Form("", ("compliance",), {}),
+                Form("stiffening", ("compliance", "bend"), {"bend": (3 / sizes.force,)}, nominated=False),
+            ),
+        ),
+        "aging": (
+            Aging(),
+            (
+                Form("", ("rate",), {}),
+                Form("settling", ("rate", "settling"), {"settling": (3 / sizes.session,)}, nominated=False),
+            ),
+        ),
+        "platen-friction": (
+            PlatenFriction(),
+            (
+                Form("", ("friction",), {}),
+                Form("another aspect", ("friction", "flattening"), {"flattening": (0.0,)}, nominated=False),
             ),
         ),
         "energy-form": (
@@ -177,6 +246,5 @@ def entries(energy_scale: float, strain_scale: float) -> list[Entry]:
             effect = kind()
             free = tuple(p.name for p in effect.parameters if not p.frozen)
             each = tuple(p.name for p in effect.parameters if p.each)
-            grid = {k: v for k, v in effect.grid.items() if k not in ("frequency",)}
-            out.append(Entry(effect, (Form("", free, grid, each=each),), name))
+            out.append(Entry(effect, (Form("", free, dict(effect.grid), each=each),), name))
     return out

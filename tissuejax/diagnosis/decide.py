@@ -17,7 +17,7 @@ import numpy as np
 
 from tissuejax.diagnosis.quality import SIGNIFICANT, Quality, quality
 from tissuejax.diagnosis.refit import Refit
-from tissuejax.diagnosis.search import Search
+from tissuejax.diagnosis.search import Search, best_of_each
 
 GAIN = 8.0
 CLOSE = 6.0
@@ -98,13 +98,14 @@ def decide(s: Search) -> Verdict:
             kind = "unexplained"
             reasons.append(f"the best set explains {total:.0%} of the misfit ({explained[1]:.0%} of the held-out one)")
         else:
+            mine = s.names(frozenset(chosen.keys))
             rivals = tuple(
-                r
-                for r in sorted(s.refits.values(), key=s.criterion)
-                if r.keys
-                and len(r.keys) <= len(chosen.keys)
-                and set(r.keys) != set(chosen.keys)
-                and s.criterion(r) < s.criterion(chosen) + CLOSE
+                s.refits[k]
+                for k in best_of_each(s)
+                if k
+                and len(k) <= len(chosen.keys)
+                and s.names(k) != mine
+                and s.criterion(s.refits[k]) < s.criterion(chosen) + CLOSE
             )
             kind = "ambiguous" if rivals else "found"
     return Verdict(kind, chosen, rivals, explained, tuple(reasons), before, after, confidence(s, chosen))
@@ -112,7 +113,7 @@ def decide(s: Search) -> Verdict:
 
 def confidence(s: Search, chosen: Refit) -> float:
     """Weight of the chosen set among all sets of no more effects, from the criterion, tempered for unknown laws."""
-    rivals = [r for r in s.refits.values() if len(r.keys) <= max(len(chosen.keys), 1)]
+    rivals = [s.refits[k] for k in best_of_each(s) if len(k) <= max(len(chosen.keys), 1)]
     scale = max(1.0, chosen.chi2 / max(chosen.n, 1))
     gaps = np.array([s.criterion(r) - s.criterion(chosen) for r in rivals]) / (4 * scale)
     return float(1 / np.sum(np.exp(-np.clip(gaps, -50, 50))))

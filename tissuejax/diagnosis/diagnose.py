@@ -10,6 +10,7 @@ import jax
 from tissuejax.cache import keep_programs
 from tissuejax.diagnosis.decide import decide
 from tissuejax.diagnosis.material import MaterialBench
+from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.diagnosis.search import Budget, search
 from tissuejax.diagnosis.sigma import sigmas
@@ -20,6 +21,8 @@ from tissuejax.progress import Progress, Silent
 from tissuejax.recordings.files import read
 from tissuejax.recordings.recording import Sample
 from tissuejax.storage import write_json
+
+PROBING = Budget(most=2, beam=(1, 1), nominees=(3, 2), share=0.05, starts=1, iterations=4, tolerance=30.0)
 
 
 def diagnose(
@@ -54,11 +57,13 @@ def diagnose(
     fitted, held_out, remarks = split(sample, holdout)
     base = named_energy(energy, ogden_form)
     kind = experiment(sample.recordings[fitted[0]].experiment).kind
-    if kind != "homogeneous":
-        raise InputError(f"{sample.name}: recordings of kind {kind!r} can't be diagnosed yet")
-    sigma, more = sigmas(sample, (*fitted, *held_out))
-    bench = MaterialBench.of(sample, base, fitted, held_out, sigma, effects)
-    bench.warnings += [*remarks, *more]
+    if kind == "probing":
+        bench, budget = ProbingBench.of(sample, base, fitted, held_out, effects), budget or PROBING
+    else:
+        sigma, more = sigmas(sample, (*fitted, *held_out))
+        bench = MaterialBench.of(sample, base, fitted, held_out, sigma, effects)
+        remarks += more
+    bench.warnings += remarks
     n = sum(len(s.time) for s in bench.segments if s.recording in fitted)
     if n <= len(bench.base):
         raise InputError(

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from tissuejax.diagnosis.bench import Bench, Candidate, Free, Segment
-from tissuejax.diagnosis.catalogue import Entry, entries
+from tissuejax.diagnosis.catalogue import Entry, Sizes, entries
 from tissuejax.diagnosis.periodogram import lines
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.energies.energy import Energy
@@ -101,8 +101,16 @@ class MaterialBench(Bench):
         bench._tests = tests
         bench._of = {n: [s for s in segments if s.recording == n] for n in recordings}
         strain = max(float(np.max(np.abs(np.log(s.drive) if s.drive_name == "stretch" else s.drive))) for s in segments)
-        scale = 0.5 * float(np.quantile(np.abs(bench.y), 0.98)) * strain
-        found = [e for e in entries(scale or 1.0, strain or 1.0) if names is None or e.title in names]
+        top = float(np.quantile(np.abs(bench.y), 0.98))
+        ends = [float(np.max(t.start + t.time)) for t in tests.values()]
+        sizes = Sizes(
+            energy=0.5 * top * strain or 1.0,
+            strain=strain or 1.0,
+            force=top * float(np.nanmax([*(t.area for t in tests.values()), 1e-6])) or 1.0,
+            session=max(ends),
+            recording=max(float(np.ptp(t.time)) for t in tests.values()),
+        )
+        found = [e for e in entries(sizes) if names is None or e.title in names]
         bench._declare(energy, found)
         return bench
 
@@ -133,7 +141,10 @@ class MaterialBench(Bench):
 
         Everything that costs nothing at once, and of the others those that take part.
         """
-        key = tuple(sorted({d for p in (*values, *paths) for prefix, d in self._heavy.items() if p.startswith(prefix)}))
+        parts = {d for p in (*values, *paths) for prefix, d in self._heavy.items() if p.startswith(prefix)}
+        if parts.intersection(MEMORIES):  # together: one program fewer to compile
+            parts |= {e.effect.name for e in self._entries if e.effect.name in MEMORIES}
+        key = tuple(sorted(parts))
         if key not in self._built:
             light = [e.effect for e in self._entries if e.effect.name not in self._heavy.values()]
             effects = (*light, *(e.effect for e in self._entries if e.effect.name in key))

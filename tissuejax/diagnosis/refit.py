@@ -69,6 +69,7 @@ class Descent:
         self.low = np.array([np.log(f.lower) if f.log else f.lower for f in free])
         self.high = np.array([np.log(f.upper) if f.log else f.upper for f in free])
         self.scale = np.array([1.0 if f.log else f.scale for f in free])
+        self.last: np.ndarray | None = None
         self.priors = [(i, *f.prior) for i, f in enumerate(free) if f.prior is not None]
 
     def natural(self, x: np.ndarray) -> dict[str, float]:
@@ -90,13 +91,13 @@ class Descent:
             r = np.concatenate([r, [(m - x[i]) / s for i, m, s in self.priors]])
         return float(r @ r), r, prediction
 
-    def jacobian(self, x: np.ndarray, priors: bool = True) -> np.ndarray:
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Whitened derivative of the prediction by x, with the rows of the priors."""
         values = self.natural(x)
         jac = self.bench.jacobian({**self.rest, **values}, self.paths, self.recordings)
         factor = np.where(self.log, [values[p] for p in self.paths], 1.0)
         jac = self.misfit.whiten(jac * factor, self.recordings)
-        if self.priors and priors:
+        if self.priors:
             rows = np.zeros((len(self.priors), len(self.paths)))
             for row, (i, _, s) in zip(rows, self.priors):
                 row[i] = 1 / s
@@ -117,6 +118,7 @@ class Descent:
                 jac, age = self.jacobian(x), 0
             if not np.all(np.isfinite(jac)):
                 return x, cost, prediction, False
+            self.last = jac
             q, t = np.linalg.qr(jac)
             right = q.T @ r
             size = np.linalg.norm(jac, axis=0)
@@ -156,7 +158,7 @@ class Descent:
         span = np.where(np.isfinite(self.high - self.low), self.high - self.low, 1.0)
         at = (x - self.low < 1e-6 * span) | (self.high - x < 1e-6 * span)
         std = np.full(len(x), np.nan)
-        jac = self.jacobian(x, priors=False)
+        jac = self.last if self.bench.dear and self.last is not None else self.jacobian(x)
         norms = np.linalg.norm(jac, axis=0)
         use = ~at & (norms > 0) & np.isfinite(norms)
         if use.any():

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import lsq_linear
 
-from tissuejax.diagnosis.bench import Bench, Candidate
+from tissuejax.diagnosis.bench import Bench, Candidate, Free
 from tissuejax.diagnosis.misfit import Misfit
 
 
@@ -68,6 +68,13 @@ def gain(
     return float(r @ r - left @ left), step
 
 
+def trusted(f: Free) -> tuple[float, float]:
+    """Range of a parameter that a linear step may use: its bounds, and two standard deviations of its prior."""
+    if f.prior is None:
+        return f.lower, f.upper
+    return max(f.lower, f.prior[0] - 2 * f.prior[1]), min(f.upper, f.prior[0] + 2 * f.prior[1])
+
+
 def scores(
     bench: Bench, misfit: Misfit, values: Mapping[str, float], free: tuple[str, ...], candidates: list[Candidate]
 ) -> list[Score]:
@@ -101,8 +108,8 @@ def scores(
             if not np.all(np.isfinite(block)):
                 continue
             origin = np.array([{**bench.start, **values, **s}[a] for a in c.amplitudes])
-            low = np.array([bench.free[a].lower for a in c.amplitudes]) - origin
-            high = np.array([bench.free[a].upper for a in c.amplitudes]) - origin
+            low = np.array([trusted(bench.free[a])[0] for a in c.amplitudes]) - origin
+            high = np.array([trusted(bench.free[a])[1] for a in c.amplitudes]) - origin
             g, step = gain(r, block, np.minimum(low, 0.0), np.maximum(high, 0.0))
             trials.append((g, dict(zip(c.amplitudes, step.tolist())), dict(s), block @ step))
         if not trials:

@@ -30,6 +30,7 @@ class Budget:
         share: least share of the excess that a nominee's linear step must explain.
         starts: settings of the shapes tried in a refit.
         iterations: of a refit.
+        tolerance: of a refit, in units of chi-square.
     """
 
     most: int = 3
@@ -38,6 +39,7 @@ class Budget:
     share: float = 0.02
     starts: int = 2
     iterations: int = 30
+    tolerance: float = 0.1
 
 
 @dataclass
@@ -142,7 +144,8 @@ class Search:
         if len(starts) > 1:
             tries = [refit(self.bench, self.misfit, keys, s, iterations=5, final=False) for s in starts]
             starts = [min(tries, key=lambda t: t.chi2).values]
-        return refit(self.bench, self.misfit, keys, starts[0], iterations=self.budget.iterations)
+        budget = self.budget
+        return refit(self.bench, self.misfit, keys, starts[0], iterations=budget.iterations, tolerance=budget.tolerance)
 
     def again(self, keys: frozenset) -> Refit:
         """Refit of a set under the present noise, from where it was."""
@@ -182,9 +185,16 @@ def search(bench: Bench, budget: Budget | None = None, report: Callable[[str], N
     budget = budget or Budget()
     s = Search(bench, white(bench), budget, report=report or (lambda _: None))
     s.report("base model")
-    first = refit(bench, s.misfit, (), {}, iterations=60, final=False)
-    s.misfit = estimated(bench, bench.predict(first.values))
-    s.refits[frozenset()] = refit(bench, s.misfit, (), first.values, iterations=60)
+    first = refit(
+        bench, s.misfit, (), {}, iterations=2 * budget.iterations, tolerance=budget.tolerance, final=bench.dear
+    )
+    if not bench.dear:
+        s.misfit = estimated(bench, bench.predict(first.values))
+        first = refit(bench, s.misfit, (), first.values, iterations=2 * budget.iterations)
+    s.refits[frozenset()] = first
+    if bench.dear and quality(s, first).noise:
+        s.score(frozenset())
+        return s
     for size in range(budget.most):
         at = [k for k in best_of_each(s) if len(k) == size][: budget.beam[min(size, len(budget.beam) - 1)]]
         grown = [
@@ -194,9 +204,9 @@ def search(bench: Bench, budget: Budget | None = None, report: Callable[[str], N
         ]
         if not grown:
             break
-        if size == 0:
+        if size == 0 and not bench.dear:
             renew_noise(s)
-        for keys in best_of_each(s)[:2]:
+        for keys in best_of_each(s)[: 1 if bench.dear else 2]:
             s.reshape(keys)
         best = min(s.refits.values(), key=s.criterion)
         if len(best.keys) <= size or quality(s, best).noise:
