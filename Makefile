@@ -27,6 +27,7 @@ slow: $(STAMP)
 	$(BIN)/python -m pytest -q -m slow
 
 bench: $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[bench]'
 	for f in tests/bench/bench_*.py; do $(BIN)/python $$f; done
 
 format: $(STAMP)
