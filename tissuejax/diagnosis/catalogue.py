@@ -15,6 +15,7 @@ import numpy as np
 
 from tissuejax.diagnosis.bench import Candidate, Free
 from tissuejax.effects.aging import Aging
+from tissuejax.effects.anisotropy import Anisotropy
 from tissuejax.effects.catalogue import effects
 from tissuejax.effects.drift import Drift
 from tissuejax.effects.effect import Effect
@@ -206,6 +207,13 @@ def entries(sizes: Sizes) -> list[Entry]:
             (
                 Form("", ("compliance",), {}),
                 Form("stiffening", ("compliance", "bend"), {"bend": (3 / sizes.force,)}, nominated=False),
+            ),
+        ),
+        "anisotropy": (
+            Anisotropy(),
+            (
+                Form("in the xy plane", ("k1", "k2", "angle"), {"angle": tuple(np.arange(4) * np.pi / 4)}),
+                Form("any direction", ("k1", "k2", "angle", "elevation"), {"elevation": (0.8, -0.8)}, nominated=False),
             ),
         ),
         "aging": (

@@ -10,6 +10,7 @@ import jax
 from tissuejax.cache import keep_programs
 from tissuejax.diagnosis.decide import decide
 from tissuejax.diagnosis.material import MaterialBench
+from tissuejax.diagnosis.next_experiment import proposals
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.diagnosis.search import Budget, search
@@ -73,7 +74,13 @@ def diagnose(
     with (progress or Silent()).stage(f"diagnosing {sample.name}") as stage:
         found = search(bench, budget, lambda note: stage.advance(note=note))
     verdict = decide(found)
-    diagnosis = Diagnosis(sample.name, energy, found, verdict, time.perf_counter() - begun)
+    ideas = [
+        p
+        for rival in verdict.rivals[:2]
+        if kind == "homogeneous"
+        for p in proposals(sample, base, bench, verdict.chosen, rival)
+    ]
+    diagnosis = Diagnosis(sample.name, energy, found, verdict, time.perf_counter() - begun, ideas)
     if out is not None:
         write_json(Path(out) / "result.json", diagnosis.as_dict())
         write_json(Path(out) / "remainder.json", diagnosis.remainders())

@@ -60,12 +60,14 @@ class MaterialBench(Bench):
         held_out: tuple[str, ...],
         sigma: Mapping[str, float],
         names: Sequence[str] | None = None,
+        sizes: Sizes | None = None,
     ) -> "MaterialBench":
         """The bench of `sample` with base model `energy`.
 
         Args:
             sigma: noise standard deviation of each recording, Pa.
             names: effects to try; all that act in material tests by default.
+            sizes: of the recordings; worked out by default.
         """
         recordings = (*fitted, *held_out)
         tests = {
@@ -103,13 +105,14 @@ class MaterialBench(Bench):
         strain = max(float(np.max(np.abs(np.log(s.drive) if s.drive_name == "stretch" else s.drive))) for s in segments)
         top = float(np.quantile(np.abs(bench.y), 0.98))
         ends = [float(np.max(t.start + t.time)) for t in tests.values()]
-        sizes = Sizes(
+        sizes = sizes or Sizes(
             energy=0.5 * top * strain or 1.0,
             strain=strain or 1.0,
             force=top * float(np.nanmax([*(t.area for t in tests.values()), 1e-6])) or 1.0,
             session=max(ends),
             recording=max(float(np.ptp(t.time)) for t in tests.values()),
         )
+        bench.sizes = sizes
         found = [e for e in entries(sizes) if names is None or e.title in names]
         bench._declare(energy, found)
         return bench

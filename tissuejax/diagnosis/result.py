@@ -1,7 +1,7 @@
 """The diagnosis as data: what `result.json` holds, and what the page and the tables are made from."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import version
 
 import numpy as np
@@ -22,6 +22,7 @@ class Diagnosis:
         search: everything tried.
         verdict: the answer.
         seconds: wall time.
+        proposals: what to measure next (`next_experiment.Proposal`), best first.
     """
 
     sample: str
@@ -29,6 +30,7 @@ class Diagnosis:
     search: Search
     verdict: Verdict
     seconds: float
+    proposals: list = field(default_factory=list)
 
     def as_dict(self) -> dict:
         """`result.json`."""
@@ -41,6 +43,7 @@ class Diagnosis:
             "effects": self.effects(v.chosen) if v.kind in ("found", "ambiguous") else [],
             "best_attempt": self.effects(v.chosen) if v.kind == "unexplained" else [],
             "alternatives": self.alternatives(),
+            "next_experiment": [p.as_dict() for p in self.proposals],
             "located": [x.as_dict() for x in locate(bench, s.empty.prediction)],
             "candidates": self.candidates(),
             "before": self.errors(s.empty),

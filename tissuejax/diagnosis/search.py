@@ -125,6 +125,8 @@ class Search:
         at = keys
         for _ in range(4):
             parent, trials = self.refits[at], []
+            if quality(self, parent).noise:
+                return
             for old in parent.keys:
                 for new in self.bench.candidates[old].beside:
                     key = at - {old} | {new}
