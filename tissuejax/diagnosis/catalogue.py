@@ -98,9 +98,14 @@ class Entry:
                 )
             )
         for i, c in enumerate(candidates):
-            beside = [candidates[j].key for j in (i - 1, i + 1) if 0 <= j < len(candidates)]
+            beside = [candidates[j].key for j in range(len(candidates)) if self.near(i, j)]
             candidates[i] = replace(c, beside=tuple(beside))
         return free, start, candidates
+
+    def near(self, i: int, j: int) -> bool:
+        """Whether forms i and j are tried beside each other: next in the order, or one freeing all the other frees."""
+        a, b = (set(self.forms[k].free) for k in (i, j))
+        return i != j and (abs(i - j) == 1 or a < b or b < a)
 
 
 def settings(grid: Mapping[str, tuple[float, ...]], paths: Mapping[str, list[str]]) -> tuple[dict[str, float], ...]:
@@ -192,7 +197,12 @@ def entries(sizes: Sizes) -> list[Entry]:
             PermanentSet(),
             (
                 Form("", ("amount",), {}),
-                Form("with threshold", ("amount", "threshold"), {"threshold": (0.2 * sizes.strain,)}, nominated=False),
+                Form(
+                    "with threshold",
+                    ("amount", "threshold", "measure"),
+                    {"threshold": (0.0, 0.2 * sizes.strain), "measure": (0.1,)},
+                    nominated=False,
+                ),
             ),
         ),
         "slack": (
@@ -220,7 +230,12 @@ def entries(sizes: Sizes) -> list[Entry]:
             Aging(),
             (
                 Form("", ("rate",), {}),
-                Form("settling", ("rate", "settling"), {"settling": (3 / sizes.session,)}, nominated=False),
+                Form(
+                    "settling",
+                    ("rate", "settling"),
+                    {"settling": (1 / sizes.session, -0.5 / sizes.session)},
+                    nominated=False,
+                ),
             ),
         ),
         "platen-friction": (

@@ -12,6 +12,7 @@ where the linearised program takes three times as long to compile as the predict
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 import jax
@@ -73,6 +74,8 @@ class MaterialBench(Bench):
         tests = {
             n: lengthened(experiment(sample.recordings[n].experiment).test(sample.recordings[n])) for n in recordings
         }
+        first = min(float(t.start) for t in tests.values())  # the clock's zero means nothing, only what has passed
+        tests = {n: replace(t, start=t.start - first) for n, t in tests.items()}
         segments, ys, sigmas, at = [], [], [], 0
         for n in recordings:
             r = sample.recordings[n]
@@ -104,7 +107,7 @@ class MaterialBench(Bench):
         bench._of = {n: [s for s in segments if s.recording == n] for n in recordings}
         strain = max(float(np.max(np.abs(np.log(s.drive) if s.drive_name == "stretch" else s.drive))) for s in segments)
         top = float(np.quantile(np.abs(bench.y), 0.98))
-        ends = [float(np.max(t.start + t.time)) for t in tests.values()]
+        ends = [float(t.start + np.ptp(t.time)) for t in tests.values()]
         sizes = sizes or Sizes(
             energy=0.5 * top * strain or 1.0,
             strain=strain or 1.0,
@@ -138,9 +141,10 @@ class MaterialBench(Bench):
             self.free.update(free)
             self.start.update(start)
             self.candidates.update({c.key: c for c in candidates})
+        self._amplitudes = {p for c in self.candidates.values() for p in c.amplitudes}
 
     def _model(self, values: Mapping[str, float], paths: Sequence[str] = ()) -> tuple[Model, dict]:
-        """The model for a set of moving paths, with the sources of its values.
+        """The model for a set of moving paths, with the places of its values.
 
         Everything that costs nothing at once, and of the others those that take part.
         """
@@ -152,60 +156,86 @@ class MaterialBench(Bench):
             light = [e.effect for e in self._entries if e.effect.name not in self._heavy.values()]
             effects = (*light, *(e.effect for e in self._entries if e.effect.name in key))
             model = Model(self._energy, None, effects)
-            sources = {n: [model.source_of(p, n) for p in model.declared] for n in self._tests}
-            self._built[key] = (model, sources)
+            self._built[key] = (model, {n: self._places(model, n) for n in self._tests})
         return self._built[key]
 
+    def _places(self, model: Model, name: str) -> tuple[np.ndarray, tuple[dict[str, int], ...]]:
+        """Neutral theta, and where values go in it: the recording's own, which count more, after the common ones."""
+        declared = model.declared
+        neutral = np.array([self._neutral[p] for p in declared], float)
+        both = [model.source_of(p, name)[::-1] for p in declared]
+        return neutral, tuple({s[k]: i for i, s in enumerate(both) if len(s) > k} for k in (0, 1))
+
     def _theta(self, sources: dict, values: Mapping[str, float], name: str) -> np.ndarray:
-        whole = {**self._neutral, **values}
-        return np.array([next(whole[s] for s in source if s in whole) for source in sources[name]], float)
+        neutral, places = sources[name]
+        theta = neutral.copy()
+        for place in places:
+            for path, value in values.items():
+                if path in place:
+                    theta[place[path]] = value
+        return theta
 
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:
         """See `Bench.predict`."""
         model, sources = self._model(values)
         out = self.y.copy()
         for name in recordings or self._tests:
-            stress = np.asarray(_predict(model, self._theta(sources, values, name), self._tests[name]))
-            for s in self._of[name]:
-                part = stress[: len(s.time)]
-                out[s.rows] = part[:, int(s.component.split()[1]) - 1] if s.component else part
+            self._put(out, name, np.asarray(_predict(model, self._theta(sources, values, name), self._tests[name])))
         return out
+
+    def _put(self, out: Float[np.ndarray, " N"], name: str, stress: Float[np.ndarray, "n ..."]) -> None:
+        for s in self._of[name]:
+            part = stress[: len(s.time)]
+            out[s.rows] = part[:, int(s.component.split()[1]) - 1] if s.component else part
+
+    def _differences(
+        self, pairs: Sequence[tuple[Mapping[str, float], Mapping[str, float]]], recordings: Sequence[str] | None
+    ) -> Float[np.ndarray, "N k"]:
+        """Second less first prediction of every pair of settings, equal ones run once; zero where both are the same."""
+        out = np.zeros((len(pairs), len(self.y)))
+        groups: dict[Model, list[int]] = {}
+        for i, (_, moved) in enumerate(pairs):
+            groups.setdefault(self._model(moved)[0], []).append(i)
+        for model, members in groups.items():
+            _, sources = self._model(pairs[members[0]][1])
+            for name in recordings or self._tests:
+                thetas: dict[bytes, np.ndarray] = {}
+                ends = []
+                for i in members:
+                    two = [self._theta(sources, values, name) for values in pairs[i]]
+                    ends.append([t.tobytes() for t in two])
+                    if ends[-1][0] != ends[-1][1]:
+                        thetas.update(zip(ends[-1], two))
+                known = {k: np.asarray(_predict(model, t, self._tests[name])) for k, t in thetas.items()}
+                for i, (before, after) in zip(members, ends):
+                    if before != after:
+                        self._put(out[i], name, known[after] - known[before])
+        return out.T
+
+    def _step(self, path: str, value: float) -> float:
+        f = self.free[path]
+        h = STEP * (abs(value) if f.log else max(f.scale, abs(value)))
+        return -h if value + h > f.upper else h
 
     def jacobian(
         self, values: Mapping[str, float], paths: Sequence[str], recordings: Sequence[str] | None = None
     ) -> Float[np.ndarray, "N k"]:
         """See `Bench.jacobian`."""
         at = {**{p: self.start[p] for p in paths}, **values}
-        origin, out = self.predict(at, recordings), np.empty((len(self.y), len(paths)))
-        for i, p in enumerate(paths):
-            f = self.free[p]
-            h = STEP * (abs(at[p]) if f.log else max(f.scale, abs(at[p])))
-            h = -h if at[p] + h > f.upper else h
-            out[:, i] = (self.predict({**at, p: at[p] + h}, recordings) - origin) / h
-        return out
+        steps = np.array([self._step(p, at[p]) for p in paths])
+        return self._differences([(at, {**at, p: at[p] + h}) for p, h in zip(paths, steps)], recordings) / steps
 
     def columns(
         self, values: Mapping[str, float], settings: Sequence[tuple[Mapping[str, float], str]]
     ) -> Float[np.ndarray, "N k"]:
-        """See `Bench.columns`. Shapes of different effects don't meet at neutral amplitudes: they share a run."""
-        groups: dict[tuple, tuple[dict, list[int]]] = {}
-        for i, (setting, path) in enumerate(settings):
-            heavy = tuple(d for prefix, d in self._heavy.items() if path.startswith(prefix))
-            number = 0
-            while True:
-                merged, members = groups.setdefault((heavy, number), ({}, []))
-                if all(merged.get(k, v) == v for k, v in setting.items()):
-                    merged.update(setting)
-                    members.append(i)
-                    break
-                number += 1
-        out = np.empty((len(self.y), len(settings)))
-        for merged, members in groups.values():
-            unique = list(dict.fromkeys(settings[i][1] for i in members))
-            jac = self.jacobian({**values, **merged}, unique, self.fitted)
-            for i in members:
-                out[:, i] = jac[:, unique.index(settings[i][1])]
-        return out
+        """See `Bench.columns`. While an effect is neutral its shapes mean nothing: all start from one prediction."""
+        pairs, steps = [], []
+        for setting, path in settings:
+            at = {path: self.start[path], **values, **setting}
+            steps.append(self._step(path, at[path]))
+            acting = {k: v for k, v in setting.items() if k in self._amplitudes and v != self.start[k]}
+            pairs.append(({**values, path: at[path], **acting}, {**at, path: at[path] + steps[-1]}))
+        return self._differences(pairs, self.fitted) / np.array(steps)
 
     def settings(self, candidate: Candidate, prediction: Float[np.ndarray, " N"]) -> Sequence[Mapping[str, float]]:
         """Frequencies are read from the periodogram of the residual; see `Bench.settings`."""

@@ -3,9 +3,11 @@
 Greedy forward selection fails where two effects mask each other, so a beam of the best sets is kept at every size,
 every one scored anew at its own fit. A set reached once is never refitted. The noise is estimated anew from the
 best fit so far, since correlation can only be seen once the smooth mismatch is gone, and then all is compared
-under that one noise.
+under that one noise. In the end every effect of the best set is left out once, so that none stays that was only a
+stepping stone.
 """
 
+import itertools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -17,6 +19,7 @@ from tissuejax.diagnosis.misfit import Misfit, estimated, white
 from tissuejax.diagnosis.quality import quality
 from tissuejax.diagnosis.refit import Refit, refit
 from tissuejax.diagnosis.score import Score, scores
+from tissuejax.errors import NotConverged
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ class Budget:
     """
 
     most: int = 3
-    beam: tuple[int, ...] = (1, 3, 1)
+    beam: tuple[int, ...] = (1, 4, 2)
     nominees: tuple[int, ...] = (9, 4, 3)
     share: float = 0.02
     starts: int = 2
@@ -70,12 +73,14 @@ class Search:
         return r.k * math.log(inside) + len(r.own) * math.log(outside)
 
     def criterion(self, r: Refit) -> float:
-        """chi-square fitted + penalty + chi-square held out: the smaller the better.
+        """Surprise of the fitted recordings + penalty + surprise of the held-out ones: the smaller the better.
 
         The first two are Schwarz's criterion; the third is minus twice the log predictive density of recordings that
         took no part in the fit, up to a constant, so the sum is one evidence-like number.
         """
-        return r.chi2 + self.penalty(r) + r.held
+        if self.bench.dear:
+            return r.chi2 + self.penalty(r) + r.held
+        return surprise(r.chi2, r.n) + self.penalty(r) + surprise(r.held, r.n_held)
 
     def names(self, keys: frozenset) -> frozenset:
         """Effects in a set, whatever their form."""
@@ -100,10 +105,24 @@ class Search:
         out, count = [], {}
         for s in sorted(self.score(keys), key=lambda s: -worth.get(s.key, -math.inf)):
             name = self.bench.candidates[s.key].name
-            if worth.get(s.key, -1.0) <= 0 or count.get(name, 0) >= 2 or (name not in count and len(count) >= most):
+            if worth.get(s.key, -1.0) <= 0 or (name not in count and len(count) >= most):
+                continue
+            if count.get(name, 0) >= (1 if keys and not self.bench.dear else 2):  # the other forms are tried beside it
                 continue
             count[name] = count.get(name, 0) + 1
             out.append(s)
+        return out
+
+    def extensions(self, parents: list[frozenset], most: int) -> list[tuple[frozenset, Score]]:
+        """Nominees of several sets, best first of each in turn, no company of effects twice."""
+        lists = [[(keys, score) for score in self.nominees(keys, most)] for keys in parents]
+        out, seen = [], set()
+        for row in itertools.zip_longest(*lists):
+            for keys, score in filter(None, row):
+                company = self.names(keys | {score.key})
+                if len(parents) == 1 or company not in seen:
+                    out.append((keys, score))
+                seen.add(company)
         return out
 
     def extend(self, keys: frozenset, score: Score) -> frozenset:
@@ -140,6 +159,18 @@ class Search:
             if best == at:
                 return
             at = best
+
+    def leave_out(self) -> None:
+        """Refit the best set without each of its effects in turn, and go on from the best of these if it is better."""
+        at = None
+        while at != (at := frozenset(min(self.refits.values(), key=self.criterion).keys)):
+            parent = self.refits[at]
+            for key in parent.keys if len(parent.keys) > 1 else ():
+                smaller = at - {key}
+                if smaller not in self.refits:
+                    order = tuple(k for k in parent.keys if k != key)
+                    self.report(" + ".join(order))
+                    self.refits[smaller] = self.best(order, [parent.values])
 
     def best(self, keys: tuple[str, ...], starts: list[Mapping[str, float]]) -> Refit:
         """The best of several starts, each given a few iterations before the winner is finished."""
@@ -190,6 +221,11 @@ def search(bench: Bench, budget: Budget | None = None, report: Callable[[str], N
     first = refit(
         bench, s.misfit, (), {}, iterations=2 * budget.iterations, tolerance=budget.tolerance, final=bench.dear
     )
+    if not math.isfinite(first.chi2):
+        raise NotConverged(
+            f"the base model can't be fitted to {', '.join(bench.fitted)}: its prediction is not finite there from any "
+            "parameters tried; name another --energy, or leave out the samples of largest strain"
+        )
     if not bench.dear:
         s.misfit = estimated(bench, bench.predict(first.values))
         first = refit(bench, s.misfit, (), first.values, iterations=2 * budget.iterations)
@@ -199,21 +235,31 @@ def search(bench: Bench, budget: Budget | None = None, report: Callable[[str], N
         return s
     for size in range(budget.most):
         at = [k for k in best_of_each(s) if len(k) == size][: budget.beam[min(size, len(budget.beam) - 1)]]
-        grown = [
-            s.extend(keys, score)
-            for keys in at
-            for score in s.nominees(keys, budget.nominees[min(size, len(budget.nominees) - 1)])
-        ]
+        most = budget.nominees[min(size, len(budget.nominees) - 1)]
+        grown = [s.extend(keys, score) for keys, score in s.extensions(at, most)]
         if not grown:
             break
         if size == 0 and not bench.dear:
             renew_noise(s)
-        for keys in best_of_each(s)[: 1 if bench.dear else 2]:
+        for keys in best_of_each(s)[: 1 if bench.dear else 4]:
             s.reshape(keys)
         best = min(s.refits.values(), key=s.criterion)
         if len(best.keys) <= size or quality(s, best).noise:
             break
+    if not bench.dear:
+        s.leave_out()
     return s
+
+
+def surprise(chi2: float, n: int) -> float:
+    """Minus twice the log-likelihood of n whitened residuals, up to a constant, for a misfit of unknown size.
+
+    n (log v + s / v) with s = chi2 / n at its best v >= 1: chi-square where only noise is left, n (1 + log s) where
+    something else is. A model that is known to be wrong by tens of standard deviations says little by the difference
+    of two chi-squares, and in a recording that it can't predict at all next to nothing.
+    """
+    s = chi2 / n if n else 0.0
+    return chi2 if s <= 1 else n * (1 + math.log(s))
 
 
 def best_of_each(s: Search) -> list[frozenset]:

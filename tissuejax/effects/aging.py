@@ -17,6 +17,8 @@ from tissuejax.recordings.recording import Channel
 class Aging(Effect):
     """S = exp(rate T) S_e, T the time since the first recording: `start` of the recording plus its own time.
 
+    With `settling` s, T counts as (1 - exp(-s T))/s: dying out for s > 0, gathering pace for s < 0.
+
     Revealed by later recordings that are stiffer or softer than earlier ones of the same kind. Blind: a single short
     recording, and recordings without `start` (only the drift inside each is then seen).
     Source: first-order drift of the modulus; the exponential keeps stiffness positive.
@@ -32,10 +34,10 @@ class Aging(Effect):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         meaning = "relative change of stiffness a second"
-        settling = "rate at which the drift dies out"
+        settling = "rate at which the drift dies out, or gathers pace if negative"
         return (
             Parameter("rate", "1/s", 0.0, lower=-1.0, upper=1.0, scale=1e-4, meaning=meaning),
-            Parameter("settling", "1/s", 0.0, lower=0.0, upper=1.0, scale=1e-3, frozen=True, meaning=settling),
+            Parameter("settling", "1/s", 0.0, lower=-0.02, upper=1.0, scale=1e-3, frozen=True, meaning=settling),
         )
 
     def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:

@@ -46,6 +46,6 @@ def running_peak(s: Float[Array, "n ..."]) -> Float[Array, "n ..."]:
 
 
 def dying(time: Float[Array, " n"], rate: Float[Array, ""]) -> Float[Array, " n"]:
-    """(1 - exp(-rate t))/rate: time as a drift feels it that dies out; t itself at rate 0."""
-    going = rate > 0
+    """(1 - exp(-rate t))/rate: time as a drift feels it that dies out (gathers pace, rate < 0); t itself at rate 0."""
+    going = rate != 0
     return jnp.where(going, -jnp.expm1(-rate * time) / jnp.where(going, rate, 1.0), time)

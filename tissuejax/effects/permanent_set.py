@@ -16,11 +16,12 @@ class PermanentSet(Effect):
     """Elastic strain = strain - amount (largest + smallest strain so far), strain being stretch - 1 or shear.
 
     The stress-free length follows the extremes of the past, in tension and in compression alike. Strain below
-    `threshold` leaves nothing behind (0 unless named).
+    `threshold` leaves nothing behind (0 unless named). Stretch l is strained by (l^m - 1)/m, m being `measure`: 1 unless
+    named, 0 the logarithm (a set that multiplies the length in place of adding to it).
 
     Revealed by stress of the opposite sign when the specimen is brought back to its first length, and by a shifted
     origin in later cycles. Blind: monotonic loading (the amount is then taken up by the stiffness).
-    Source: Mullins 1969, Rubber Chem. Technol. 42; Diani, Fayolle and Gilormini 2009, Eur. Polym. J. 45, sec. 2.
+    Source: Seth 1964 (family of strain measures); Mullins 1969, Rubber Chem. Technol. 42; Diani, Fayolle and Gilormini 2009, Eur. Polym. J. 45, sec. 2.
     """
 
     name: ClassVar[str] = "permanent-set"
@@ -37,12 +38,18 @@ class PermanentSet(Effect):
         return (
             Parameter("amount", "1", 0.0, lower=0.0, upper=0.9, scale=0.05, meaning=meaning),
             Parameter("threshold", "1", 0.0, lower=0.0, upper=0.5, scale=0.02, frozen=True, meaning=least),
+            Parameter("measure", "1", 1.0, lower=-4.0, upper=4.0, scale=0.5, frozen=True, meaning="measure of strain"),
         )
 
     def stretch(
         self, p: Mapping[str, Array], test: MaterialTest, drive: Float[Array, "n ..."], respond: Respond
     ) -> Float[Array, "n ..."]:
-        strain = drive - test.rest
-        least = p["threshold"]
+        least, m = p["threshold"], p["measure"]
+        m = jnp.where(jnp.abs(m) < 1e-3, 1e-3, m)  # the logarithm to a thousandth
+        shear = test.mode == "shear"
+        strain = drive if shear else (drive**m - 1) / m
         extremes = running_peak(jnp.maximum(strain - least, 0.0)) - running_peak(jnp.maximum(-strain - least, 0.0))
-        return drive - p["amount"] * extremes
+        if shear:
+            return drive - p["amount"] * extremes
+        kept = -m * p["amount"] * extremes * drive**-m
+        return drive * jnp.exp(jnp.log1p(jnp.maximum(kept, -0.99)) / m)

@@ -1,0 +1,70 @@
+"""What can't be diagnosed, or only in part, is said in a sentence that tells what to do."""
+
+import numpy as np
+import pytest
+from spring_bench import spring
+
+from tissuejax.diagnosis.diagnose import diagnose
+from tissuejax.diagnosis.search import Budget, search
+from tissuejax.errors import InputError, NotConverged
+from tissuejax.recordings.recording import Channel, Recording, Sample
+
+QUICK = {"effects": ("drift",), "budget": Budget(most=1)}
+
+
+def sample(names=("r1", "r2"), n=60, values=None):
+    """Small pulls on a neo-Hookean specimen of 500 Pa."""
+    rng = np.random.default_rng(3)
+    made = {}
+    for name in names:
+        time = np.arange(n) * 0.1
+        stretch = 1 + 0.2 * np.sin(np.pi * np.arange(n) / max(n - 1, 1))
+        y = 1000 * (stretch - stretch**-2) + 2 * rng.standard_normal(n) if values is None else values(stretch)
+        made[name] = Recording(
+            name, "uniaxial", {"time": time, "stretch": stretch}, {"nominal_stress": Channel(time, y, "Pa", 2.0)}
+        )
+    return Sample("s", made)
+
+
+def test_a_file_that_is_no_recording(tmp_path):
+    path = tmp_path / "broken.h5"
+    path.write_bytes(b"not HDF5")
+    with pytest.raises(InputError, match=r"broken\.h5"):
+        diagnose(path)
+    with pytest.raises(InputError, match="absent"):
+        diagnose(tmp_path / "absent.h5")
+
+
+def test_a_single_recording_says_that_nothing_is_held_out():
+    found = diagnose(sample(("r1",)), "neo-hookean", **QUICK)
+    assert found.verdict.kind == "nothing-missing"
+    assert found.as_dict()["held_out"] == []
+    assert any("nothing could be held out" in w for w in found.as_dict()["warnings"])
+
+
+def test_holding_out_everything_leaves_nothing_to_fit():
+    with pytest.raises(InputError, match="leave at least one"):
+        diagnose(sample(), "neo-hookean", holdout=["r1", "r2"], **QUICK)
+
+
+def test_an_unknown_hold_out_is_answered_with_the_known_ones():
+    with pytest.raises(InputError, match="r1"):
+        diagnose(sample(), "neo-hookean", holdout="r3", **QUICK)
+
+
+def test_fewer_samples_than_parameters():
+    with pytest.raises(InputError, match="2 samples for 3 parameters"):
+        diagnose(sample(n=2), "reduced-polynomial-3", **QUICK)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_values_that_are_not_finite(bad):
+    with pytest.raises(InputError, match="r1"):
+        diagnose(sample(values=lambda x: np.where(x > 1.1, bad, 10.0)), "neo-hookean", **QUICK)
+
+
+def test_a_base_model_that_cannot_be_fitted_at_all():
+    bench = spring({})
+    bench.predict = lambda values, recordings=None: np.full(len(bench.y), np.nan)
+    with pytest.raises(NotConverged, match="name another --energy"):
+        search(bench)
