@@ -11,6 +11,7 @@ itself.
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import jax
 
@@ -26,9 +27,12 @@ from tissuejax.progress import Progress, Silent
 from tissuejax.recordings.files import read
 from tissuejax.recordings.recording import Sample
 
+if TYPE_CHECKING:
+    from tissuejax.diagnosis.result import Diagnosis
+
 jax.config.update("jax_enable_x64", True)
 
-__all__ = ["catalogue", "fit", "material", "read", "sensitivity", "write"]
+__all__ = ["catalogue", "diagnose", "fit", "material", "read", "sensitivity", "write"]
 
 
 def catalogue() -> dict[str, type[Energy]]:
@@ -146,11 +150,31 @@ def fit(
         )
 
 
-def write(found: Fit, out: str | os.PathLike) -> dict[str, Path]:
-    """Write result.json, report.html and figures of a fit into a folder; returns their paths by name."""
-    from tissuejax.report.page import write_fit
+def diagnose(
+    data: str | os.PathLike | Sample, energy: str, *, holdout: str | Sequence[str] | None = None, **options
+) -> "Diagnosis":
+    """What the model of a sample lacks: where it misses, which effect, how sure; see `diagnosis.diagnose.diagnose`.
 
-    return write_fit(found, Path(out))
+    Args:
+        data: a recording file or a Sample.
+        energy: base model, by name.
+        holdout: recordings that take no part in any fit; the last one by default.
+        options: `effects` to try, `ogden_form`, `progress`, `budget`.
+    """
+    from tissuejax.diagnosis.diagnose import diagnose as run
+
+    return run(data, energy, holdout=holdout, **options)
+
+
+def write(found: "Fit | Diagnosis", out: str | os.PathLike) -> dict[str, Path]:
+    """Write result.json, report.html and figures of a fit or a diagnosis into a folder; returns their paths by name."""
+    if isinstance(found, Fit):
+        from tissuejax.report.page import write_fit
+
+        return write_fit(found, Path(out))
+    from tissuejax.report.diagnosis_page import write_diagnosis
+
+    return write_diagnosis(found, Path(out))
 
 
 def sensitivity(found: Fit, **options):

@@ -52,3 +52,12 @@ def test_inflation_is_the_variance_of_a_mean(rng):
 
 def test_series_too_short_to_tell_are_taken_as_white():
     assert estimate([np.ones((10, 1))]) == Noise()
+
+
+def test_a_residual_that_is_one_smooth_curve_is_no_numerical_trouble():
+    """Spectra of thirty orders of magnitude drive the optimiser to extremes of its logits."""
+    t = np.linspace(0, 1, 300)
+    for size in (1.0, 1e6, 1e12):
+        found = estimate([(size * (t - 0.3) ** 3)[:, None], (size * np.sin(3 * t))[:, None]])
+        assert 0 <= found.share <= 1
+        assert 0 <= found.rho < 1

@@ -7,6 +7,7 @@ from typing import ClassVar
 import tissuejax.commands as package
 from tissuejax import verbs
 from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.diagnose import told
 from tissuejax.commands.fitting import reply
 from tissuejax.errors import InputError
 from tissuejax.progress import for_terminal
@@ -17,7 +18,7 @@ ENERGY, HELD = "reduced-polynomial-2", "holdout"
 
 
 class Demo(Command):
-    """Fit the two demonstration samples and say where the pages are."""
+    """Fit the two demonstration samples, diagnose the second, and say where the pages are."""
 
     name: ClassVar[str] = "demo"
     order: ClassVar[int] = 1
@@ -25,7 +26,8 @@ class Demo(Command):
     teaches: ClassVar[str] = """
 Fits a strain energy to two small samples that come with the project, each pulled, pressed and sheared; a fourth
 recording is held out. The first is elastic: the model fits to the noise and predicts the held-out recording. In the
-second something is concealed, and the page says so. Read the pages in a browser.
+second something is concealed: the fit's page says that it can't follow, and the diagnosis says what is missing.
+Read the pages in a browser.
 
   tissuejax demo --out out/demo
 """
@@ -37,7 +39,7 @@ second something is concealed, and the page says so. Read the pages in a browser
         )
 
     def run(self, given: argparse.Namespace) -> Reply:
-        """Fit both, write both pages."""
+        """Fit both, diagnose the one that can't be fitted, write the pages."""
         folder = next((p for p in PLACES if p.is_dir()), None)
         if folder is None:
             raise InputError(f"the demonstration data are not here; run in a checkout (looked at {PLACES[0]})")
@@ -48,4 +50,8 @@ second something is concealed, and the page says so. Read the pages in a browser
             answer = reply(found, verbs.write(found, given.out / name))
             texts += [f"== {folder / name}.h5", "", answer.text, ""]
             record[name], code = answer.record, max(code, answer.code)
+        found = verbs.diagnose(sample, ENERGY, holdout=HELD, progress=for_terminal())
+        answer = told(found, verbs.write(found, given.out / "diagnosis"))
+        texts += [f"== what is missing in {folder / name}.h5", "", answer.text, ""]
+        record["diagnosis"] = answer.record
         return Reply(record, "\n".join(texts).rstrip(), code)

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from tissuejax.commands.command import Command, Reply
 from tissuejax.diagnosis.diagnose import diagnose
+from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read
 from tissuejax.report import diagnosis_sentences as sentences
@@ -56,10 +57,14 @@ still left, as smooth functions of drive, rate and time) and the figures as PNG.
             effects=given.effect,
             ogden_form=given.ogden_form,
         )
-        written = write_diagnosis(found, given.out or Path("out") / sample.name)
-        lines = [found.verdict.kind, "", sentences.lead(found), ""]
-        lines += [f"  {r['path']:<40}{r['value']:>24} {r['unit']:<6}{r['note']}" for r in sentences.parameters(found)]
-        lines += ["", *sentences.sure(found), ""]
-        lines += [f"page     {written['page']}", f"numbers  {written['result']}"]
-        record = found.as_dict() | {"files": {name: str(path) for name, path in written.items()}}
-        return Reply(record, "\n".join(lines))
+        return told(found, write_diagnosis(found, given.out or Path("out") / sample.name))
+
+
+def told(found: Diagnosis, written: dict[str, Path]) -> Reply:
+    """The verdict as text and as the record of `--json`."""
+    lines = [found.verdict.kind, "", sentences.lead(found), ""]
+    lines += [f"  {r['path']:<40}{r['value']:>24} {r['unit']:<6}{r['note']}" for r in sentences.parameters(found)]
+    lines += ["", *sentences.sure(found), ""]
+    lines += [f"page     {written['page']}", f"numbers  {written['result']}"]
+    record = found.as_dict() | {"files": {name: str(path) for name, path in written.items()}}
+    return Reply(record, "\n".join(lines))

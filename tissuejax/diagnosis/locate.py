@@ -139,7 +139,7 @@ def _drive(segments: list[Segment], z: np.ndarray) -> Iterable[Located]:
     first = segments[0]
     for i in np.argsort(-sums)[:2]:
         low, high = edges[i] + rest_value(first), edges[i + 1] + rest_value(first)
-        what = f"{first.drive_name} {low:.4g} to {high:.4g} {first.drive_unit}".replace(" 1", "", 0)
+        what = f"{first.drive_name} {low:.4g} to {high:.4g} {first.drive_unit}".removesuffix(" 1")
         details = {"from": float(low), "to": float(high), "unit": first.drive_unit}
         yield Located(first.channel, "all", what, sums[i] / sums.sum(), "drive", details)
 

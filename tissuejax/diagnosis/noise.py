@@ -20,6 +20,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.optimize import minimize
+from scipy.special import expit
 
 BLOCK = 1024  # samples whitened together: a dense factor of this size costs 0.1 s and 8 MiB
 
@@ -86,7 +87,7 @@ def estimate(residuals: list[Float[np.ndarray, "n k"]], least: int = 64) -> Nois
         return Noise()
 
     def cost(x: np.ndarray, white: bool) -> float:
-        share, rho = (0.0, 0.0) if white else (1 / (1 + math.exp(-x[0])), 0.995 / (1 + math.exp(-x[1])))
+        share, rho = (0.0, 0.0) if white else (expit(x[0]), 0.995 * expit(x[1]))
         total = 0.0
         for (w, p, k), a in zip(spectra, x[0 if white else 2 :]):
             s = 1 - share + share * (1 - rho**2) / (1 - 2 * rho * np.cos(w) + rho**2)
@@ -104,7 +105,7 @@ def estimate(residuals: list[Float[np.ndarray, "n k"]], least: int = 64) -> Nois
     best = min(trials, key=lambda t: t.fun)
     if 2 * (best_white.fun - best.fun) < 8.0:
         return Noise()
-    return Noise(1 / (1 + math.exp(-best.x[0])), 0.995 / (1 + math.exp(-best.x[1])))
+    return Noise(float(expit(best.x[0])), 0.995 * float(expit(best.x[1])))
 
 
 def portmanteau(white: list[Float[np.ndarray, " n"]], lags: int = 20) -> float:

@@ -1,9 +1,11 @@
-"""What is still missing, described as data: the remainder as a smooth function of drive, rate and time.
+"""What is still missing, described as data: the remainder as a smooth function of drive, rate, time and place.
 
-    residual(t) = a(drive) + b(signed root of the rate) + c(time in the recording) + noise,
+    residual(t) = constant + a(drive) + b(signed root of the rate) + c(time in the recording) + noise,
 
-each a cubic spline with a ridge on its bends, all fitted together, the ridge chosen by generalised cross-validation. No
-physics: something for a researcher to look at, with the size of each part saying where to look first.
+each a cubic spline with a ridge on its bends, all fitted together, the ridge chosen by generalised cross-validation; a
+and b have no mean over the samples, c has one of its own in every recording and none over all. Where markers lie on a
+surface, their remainder under the deepest probe is a smooth function of their place at rest, bells with a ridge.
+No physics: something for a researcher to look at, with the size of each part saying where to look first.
 
 Source: Hastie and Tibshirani 1990, Generalized Additive Models; Golub, Heath and Wahba 1979, Technometrics 21 (GCV).
 """
@@ -23,13 +25,15 @@ class Remainder:
 
     Attributes:
         channel, unit: which series.
-        curves: {"drive" | "rate" | "time": {"x", "value"}}; time has one curve a recording under "time/NAME".
-        share: fraction of the residual's variance that each part holds.
+        constant: mean of the smooth part, in `unit`.
+        curves: {"drive" | "rate" | "time/RECORDING": {"x", "value"}}, in order of x; x in SI.
+        share: fraction of the residual's sum of squares that each part holds, "noise" what none does.
         series: {recording: {"time", "drive", "rate", "remainder", "smooth"}}.
     """
 
     channel: str
     unit: str
+    constant: float
     curves: dict[str, dict[str, list[float]]]
     share: dict[str, float]
     series: dict[str, dict[str, list[float]]]
@@ -39,7 +43,8 @@ class Remainder:
         return {
             "channel": self.channel,
             "unit": self.unit,
-            "share_of_variance": self.share,
+            "constant": self.constant,
+            "share_of_squares": self.share,
             "curves": self.curves,
             "series": self.series,
         }
@@ -81,21 +86,21 @@ def remainder(bench: Bench, prediction: Float[np.ndarray, " N"], channel: str, c
         ridge[at : at + len(p), at : at + len(p)] = p
         at += len(p)
     coefficients = _gcv(whole, r / sigma, ridge)
-    parts, curves, at = {}, {}, 0
+    parts, at = {}, 0
     for name, b in blocks.items():
         parts[name] = b @ coefficients[at : at + b.shape[1]]
         at += b.shape[1]
-        if "/" not in name:
-            x = {"drive": drive, "rate": np.sign(rate) * rate**2}[name]
-            order = np.argsort(x)[:: max(len(x) // 100, 1)]
-            curves[name] = {"x": x[order].tolist(), "value": parts[name][order].tolist()}
     smooth = sum(parts.values())
-    variance = float(np.sum(r**2)) or 1.0
-    share = {
-        "drive": float(np.sum(parts["drive"] ** 2)) / variance,
-        "rate": float(np.sum(parts["rate"] ** 2)) / variance,
-    }
-    share["time"] = float(np.sum(sum(v for n, v in parts.items() if "/" in n) ** 2)) / variance
+    timed = sum(v for n, v in parts.items() if "/" in n)
+    whole_parts = {"drive": parts["drive"], "rate": parts["rate"], "time": timed}
+    constant = float(sum(v.mean() for v in whole_parts.values()))
+    squares = float(np.sum(r**2)) or 1.0
+    share = {name: float(np.sum((v - v.mean()) ** 2)) / squares for name, v in whole_parts.items()}
+    share |= {"constant": len(r) * constant**2 / squares, "noise": float(np.sum((r - smooth) ** 2)) / squares}
+    curves = {}
+    for name, x in (("drive", drive), ("rate", np.sign(rate) * rate**2)):
+        order = np.argsort(x, kind="stable")[:: max(len(x) // 100, 1)]
+        curves[name] = {"x": x[order].tolist(), "value": (parts[name] - parts[name].mean())[order].tolist()}
     series, at = {}, 0
     for s in segments:
         rows = slice(at, at + len(s.time))
@@ -107,9 +112,72 @@ def remainder(bench: Bench, prediction: Float[np.ndarray, " N"], channel: str, c
             "remainder": r[rows].tolist(),
             "smooth": smooth[rows].tolist(),
         }
-        part = parts[f"time/{s.recording}"][rows]
-        curves[f"time/{s.recording}"] = {"x": s.time[::5].tolist(), "value": part[::5].tolist()}
-    return Remainder(f"{channel} {component}".strip(), segments[0].unit, curves, share, series)
+        part = (timed - timed.mean())[rows]
+        every = max(len(part) // 100, 1)
+        curves[f"time/{s.recording}"] = {"x": s.time[::every].tolist(), "value": part[::every].tolist()}
+    return Remainder(f"{channel} {component}".strip(), segments[0].unit, constant, curves, share, series)
+
+
+@dataclass(frozen=True)
+class PlaceRemainder:
+    """What a prediction leaves of markers on a surface, under the deepest probe of one recording.
+
+    Attributes:
+        recording: which.
+        markers: their numbers.
+        place: where they lie at rest, m, one row a marker.
+        remainder, smooth: measured - predicted displacement, m, and its smooth part.
+        share: of the squares of the remainder that is smooth in place.
+    """
+
+    recording: str
+    markers: tuple[int, ...]
+    place: Float[np.ndarray, "k 3"]
+    remainder: Float[np.ndarray, "k 3"]
+    smooth: Float[np.ndarray, "k 3"]
+    share: float
+
+    def as_dict(self) -> dict:
+        """Plain lists, SI."""
+        return {
+            "channel": "markers",
+            "unit": "m",
+            "recording": self.recording,
+            "markers": list(self.markers),
+            "place": self.place.tolist(),
+            "remainder": self.remainder.tolist(),
+            "smooth": self.smooth.tolist(),
+            "share_of_squares": self.share,
+        }
+
+
+def over_places(bench: Bench, prediction: Float[np.ndarray, " N"], recording: str) -> PlaceRemainder | None:
+    """The remainder of a recording's markers as a smooth function of their place; None without markers.
+
+    The mean over the samples whose depth is at least 0.8 of the largest; the place is the marker's first sample.
+    """
+    found: dict[int, dict[str, Segment]] = {}
+    for s in bench.segments:
+        if s.recording == recording and s.component.startswith("marker"):
+            number, axis = s.component.split()[1:]
+            found.setdefault(int(number), {})[axis] = s
+    found = {k: v for k, v in found.items() if set(v) == {"x", "y", "z"}}
+    if len(found) < 4:
+        return None
+
+    def mean(s: Segment) -> float:
+        deep = s.drive >= 0.8 * np.max(s.drive)
+        return float(np.mean((bench.y - prediction)[s.rows][deep]))
+
+    place = np.array([[bench.y[v[a].rows][0] for a in "xyz"] for v in found.values()])
+    left = np.array([[mean(v[a]) for a in "xyz"] for v in found.values()])
+    apart = np.linalg.norm(place[:, None] - place, axis=2)
+    width = 2 * float(np.median(np.sort(apart, axis=1)[:, 1]))
+    bells = np.column_stack([np.ones(len(place)), np.exp(-0.5 * (apart / width) ** 2)])
+    ridge = np.diag([1e-9, *np.ones(len(place))])
+    smooth = np.column_stack([bells @ _gcv(bells, left[:, i], ridge) for i in range(3)])
+    share = 1 - float(np.sum((left - smooth) ** 2)) / (float(np.sum(left**2)) or 1.0)
+    return PlaceRemainder(recording, tuple(found), place, left, smooth, share)
 
 
 def _gcv(a: np.ndarray, r: np.ndarray, ridge: np.ndarray) -> np.ndarray:

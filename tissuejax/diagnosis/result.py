@@ -7,10 +7,11 @@ from importlib.metadata import version
 import numpy as np
 
 from tissuejax.diagnosis.decide import Verdict
-from tissuejax.diagnosis.locate import locate
+from tissuejax.diagnosis.locate import Located, locate
 from tissuejax.diagnosis.refit import Refit
-from tissuejax.diagnosis.remainder import remainder
+from tissuejax.diagnosis.remainder import over_places, remainder
 from tissuejax.diagnosis.search import Search, best_of_each
+from tissuejax.diagnosis.stiffness_map import regions
 
 
 @dataclass
@@ -23,6 +24,7 @@ class Diagnosis:
         verdict: the answer.
         seconds: wall time.
         proposals: what to measure next (`next_experiment.Proposal`), best first.
+        maps: of probings: where each fitted recording wants the tissue stiffer or softer (`stiffness_map`).
     """
 
     sample: str
@@ -31,6 +33,11 @@ class Diagnosis:
     verdict: Verdict
     seconds: float
     proposals: list = field(default_factory=list)
+    maps: list = field(default_factory=list)
+
+    def located(self) -> list[Located]:
+        """Where the base model misses: in time, drive, channel, and in space where maps were made."""
+        return [*locate(self.search.bench, self.search.empty.prediction), *regions(self.maps)]
 
     def as_dict(self) -> dict:
         """`result.json`."""
@@ -44,11 +51,13 @@ class Diagnosis:
             "best_attempt": self.effects(v.chosen) if v.kind == "unexplained" else [],
             "alternatives": self.alternatives(),
             "next_experiment": [p.as_dict() for p in self.proposals],
-            "located": [x.as_dict() for x in locate(bench, s.empty.prediction)],
+            "located": [x.as_dict() for x in self.located()],
             "candidates": self.candidates(),
+            "sets": self.sets(),
             "before": self.errors(s.empty),
             "after": self.errors(v.chosen),
             "base_parameters": self.base(),
+            "numerical_error": bench.numerics.as_dict() if bench.numerics else None,
             "noise": {c: {"correlated_share": n.share, "correlation": n.rho} for c, n in s.misfit.noises.items()},
             "explained": {"fitted": v.explained[0], "held_out": v.explained[1] if bench.held_out else None},
             "fitted": list(bench.fitted),
@@ -170,4 +179,7 @@ class Diagnosis:
         """What the chosen model leaves, as smooth functions, channel by channel."""
         bench = self.search.bench
         kinds = dict.fromkeys((s.channel, s.component) for s in bench.segments if "marker" not in s.component)
-        return [remainder(bench, self.verdict.chosen.prediction, c, k).as_dict() for c, k in kinds]
+        left = self.verdict.chosen.prediction
+        places = [over_places(bench, left, r) for r in (*bench.fitted, *bench.held_out)]
+        smooth = [remainder(bench, left, c, k) for c, k in kinds]
+        return [part.as_dict() for part in (*smooth, *places) if part is not None]

@@ -12,6 +12,7 @@ from tissuejax.recordings.recording import Channel, Recording
 from tissuejax.recordings.side_file import KINEMATIC, QUANTITIES, SIGNED, STRESS, Column, Part
 from tissuejax.units import factor, quantity
 
+NO_TIME = "No time was recorded: samples are taken as 1 s apart."
 IN_SHEAR = ("shear", "angle", "displacement")
 Sizes = Mapping[str, float]
 
@@ -41,7 +42,7 @@ def recording_from(
     time = values.pop("time", None)
     if not timed:
         time = np.arange(len(rows), dtype=float)
-        notes.append("No time was recorded: samples are taken as 1 s apart.")
+        notes.append(NO_TIME)
     checks.increasing(time, place, f"column {part.columns['time'][0].column!r}" if timed else "time")
     if part.lowpass is not None:
         values = {q: rig.lowpass(time, v, part.lowpass) for q, v in values.items()}

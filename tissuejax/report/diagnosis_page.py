@@ -33,9 +33,11 @@ def write_diagnosis(found: Diagnosis, out: Path) -> dict[str, Path]:
         parameters=sentences.parameters(found),
         base=sentences.base(found),
         places=sentences.places(found),
+        meanings=sentences.meanings(found),
+        steps=sentences.next_steps(found),
         sets=found.sets(),
         fits=len(found.search.refits),
-        figures=drawn,
+        figures={f["name"]: f for f in drawn},
     )
     written["page"] = write_text(out / "report.html", page)
     return written

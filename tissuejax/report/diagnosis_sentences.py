@@ -1,8 +1,12 @@
 """A diagnosis in sentences: the verdict, how sure, what it can't tell, what to measure next."""
 
+import inspect
 import math
 
+from tissuejax.diagnosis.quality import SIGNIFICANT
+from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.result import Diagnosis
+from tissuejax.effects.catalogue import effects
 from tissuejax.report.scales import with_std
 
 
@@ -45,20 +49,48 @@ def sure(d: Diagnosis) -> list[str]:
     """How sure, in numbers."""
     v, s, out = d.verdict, d.search, []
     b, q = v.base_quality, v.quality
+
+    def times(r: Refit) -> str:
+        held = f", {math.sqrt(r.held / r.n_held):.3g} in the held-out ones" if s.bench.held_out else ""
+        return f"{math.sqrt(r.chi2 / r.n):.3g} times the noise in the fitted recordings{held}"
+
+    worst = max(x for x in (b.z_fitted, b.z_held, b.z_correlation) if math.isfinite(x))
     out.append(
-        f"The base model's residual is {b.z_fitted:.1f} standard deviations larger than noise in the fitted recordings"
-        + (f", {b.z_held:.1f} in the held-out ones" if s.bench.held_out else "")
-        + f"; its correlation after whitening is at {b.z_correlation:.1f} (above 3.5 is not noise)."
+        f"The base model alone misses by {times(s.empty)} (RMS): "
+        + (
+            f"{worst:.1f} standard deviations from pure noise, where 3.5 would be too many."
+            if worst > SIGNIFICANT
+            else f"no test of size or correlation is beyond {SIGNIFICANT} standard deviations of pure noise."
+        )
     )
     if v.chosen.keys:
+        held = f" and {v.explained[1]:.0%} of the held-out one" if s.bench.held_out else ""
+        left = max(x for x in (q.z_fitted, q.z_held, q.z_correlation) if math.isfinite(x))
+        rest = "what is left is noise" if q.noise else f"what is left is not all noise ({left:.1f} standard deviations)"
         out.append(
-            f"With the chosen effects: {q.z_fitted:.1f}"
-            + (f", {q.z_held:.1f}" if s.bench.held_out else "")
-            + f" and {q.z_correlation:.1f}. They remove {v.explained[0]:.0%} of the misfit"
-            + (f" and {v.explained[1]:.0%} of the held-out one." if s.bench.held_out else ".")
+            f"With the effects it misses by {times(v.chosen)}; they remove {v.explained[0]:.0%} of the misfit{held}, "
+            f"and {rest}."
         )
+        needless = [r for k, r in s.refits.items() if k < frozenset(v.chosen.keys) and len(k) == len(v.chosen.keys) - 1]
+        if len(v.chosen.keys) > 1 and needless:
+            second = min(needless, key=s.criterion)
+            missing = joined([s.bench.candidates[k].name for k in v.chosen.keys if k not in second.keys])
+            cost = s.criterion(second) - s.criterion(v.chosen)
+            out.append(
+                f"The least needed of them is {missing}: without it the criterion is {cost:.0f} worse (8 would do)."
+            )
+        others = [r for k, r in s.refits.items() if k and s.names(k) != s.names(frozenset(v.chosen.keys))]
+        others = [r for r in others if len(r.keys) <= len(v.chosen.keys)]
+        if others and v.kind == "found":
+            best = min(others, key=s.criterion)
+            words = joined(list(dict.fromkeys(s.bench.candidates[k].name for k in best.keys)))
+            gap = s.criterion(best) - s.criterion(v.chosen)
+            out.append(
+                f"The best other explanation of the same size, {words}, is {gap:.0f} worse (above 6 is another)."
+            )
     if math.isfinite(v.confidence) and v.kind in ("found", "ambiguous"):
-        out.append(f"Stated confidence that exactly this set is right: {v.confidence:.0%}.")
+        stated = f"{v.confidence:.0%}" if v.confidence < 0.995 else "over 99 %"
+        out.append(f"Stated confidence that exactly this set is right: {stated}.")
     for channel, n in s.misfit.noises.items():
         if n.share > 0.05:
             out.append(
@@ -66,6 +98,42 @@ def sure(d: Diagnosis) -> list[str]:
                 f"from sample to sample): {n.inflation:.0f} samples count as one for smooth signals, and all tests "
                 "allow for it."
             )
+    return out
+
+
+def next_steps(d: Diagnosis) -> list[str]:
+    """What to measure next."""
+    if d.proposals:
+        return [p.as_dict()["sentence"] for p in d.proposals]
+    kind = d.verdict.kind
+    if not d.search.bench.held_out:
+        return ["Record once more, in another way, and hold that recording out: nothing guards this verdict yet."]
+    if kind == "nothing-missing":
+        return [
+            "Nothing is asked for by these recordings. What they are blind to (other rates, directions, kinds of test) "
+            "they can't speak of; a recording unlike these, held out, is the next test of the model."
+        ]
+    if kind == "found":
+        return [
+            "No further recording is needed to tell the candidates apart. A second specimen, with the effects held at "
+            "these values and only the base refitted, would show whether they belong to the material."
+        ]
+    if kind == "ambiguous":
+        return ["No variation of these protocols tells the explanations apart well; another kind of test is needed."]
+    return [
+        "Look at the remainder below (remainder.json): what it is a function of (drive, rate, time, place) says which "
+        "recording to make next, one where that varies alone. A new effect is one file: see docs/new-effect.md."
+    ]
+
+
+def meanings(d: Diagnosis) -> list[str]:
+    """What each effect of the verdict is and what it is seen by."""
+    known, out = effects(), []
+    for name in names_of(d):
+        e = known.get(name)
+        if e is not None:
+            text = (inspect.getdoc(e) or "").split("\n\n")[0].replace("\n", " ")
+            out.append(f"{name}: {text} It is seen by {e.reveals}; blind to it: {e.blind}.")
     return out
 
 

@@ -1,0 +1,78 @@
+"""Many specimens at a glance: which effects were found in which, and how far the misfit fell."""
+
+from typing import ClassVar
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tissuejax.diagnosis.specimens import Specimens
+from tissuejax.report.plot import FAINT, HELD, INK, MODEL, Plot, grid
+
+
+class DiagnosisSpecimens(Plot):
+    """Left: effects by specimen, the first one found darkest. Right: misfit before and after, over the peak."""
+
+    name: ClassVar[str] = "specimens"
+    subject: ClassVar[type] = Specimens
+    order: ClassVar[int] = 10
+
+    def prepare(self, subject: Specimens) -> dict | None:
+        """Names, effects (most frequent first), the rank of each effect in each specimen, and errors."""
+        names, effects = list(subject.records), list(subject.counts)
+        if not names:
+            return None
+        rank = np.full((len(names), max(len(effects), 1)), np.nan)
+        for i, name in enumerate(names):
+            for order, effect in enumerate(subject.records[name]["effects"]):
+                rank[i, effects.index(effect)] = order
+        errors = [subject.records[n]["rmse_over_peak"] for n in names]
+        return {
+            "names": names,
+            "groups": [subject.groups.get(n, "") for n in names],
+            "effects": effects,
+            "rank": rank,
+            "verdicts": [subject.records[n]["verdict"] for n in names],
+            **{
+                f"{when}_{role}": np.array([e[when].get(role, np.nan) for e in errors])
+                for when in ("before", "after")
+                for role in ("fitted", "held_out")
+            },
+        }
+
+    def caption(self, data: dict) -> str:
+        """What was found in how many."""
+        n = len(data["names"])
+        found = [f"{e} in {int(np.sum(np.isfinite(data['rank'][:, j])))}" for j, e in enumerate(data["effects"])]
+        return (
+            f"{n} specimens, each diagnosed for itself: {', '.join(found) or 'no effect named'} of {n}. Left: effects "
+            "found, the first one darkest; ? ambiguous, x unexplained. Right: RMSE over peak, base model (grey), with "
+            "the effects (blue fitted, orange held out)."
+        )
+
+    def draw(self, data: dict) -> Figure:
+        """Two panels sharing the specimens."""
+        n = len(data["names"])
+        figure, (left, right) = grid(2, columns=2, height=max(2.4, 0.6 + 0.2 * n))
+        y = np.arange(n)[::-1]
+        for j in range(len(data["effects"])):
+            for i in range(n):
+                order = data["rank"][i, j]
+                if np.isfinite(order):
+                    left.plot(j, y[i], "s", color=MODEL, alpha=max(1 - 0.3 * order, 0.25), markersize=7)
+        for i, kind in enumerate(data["verdicts"]):
+            mark = {"ambiguous": "?", "unexplained": "x", "nothing-missing": "–"}.get(kind, "")
+            left.text(len(data["effects"]) - 0.4, y[i], mark, color=INK, fontsize=8, va="center")
+        left.set_xticks(range(len(data["effects"])), data["effects"], rotation=35, ha="right")
+        left.set_xlim(-0.7, max(len(data["effects"]), 1) - 0.1)
+        left.set_yticks(y, data["names"], fontsize=7)
+        for when, role, colour in (
+            ("before", "fitted", FAINT),
+            ("after", "fitted", MODEL),
+            ("after", "held_out", HELD),
+        ):
+            values = 100 * data[f"{when}_{role}"]
+            right.plot(values, y, "o", color=colour, markersize=4)
+        right.set_xscale("log")
+        right.set_yticks(y, [])
+        right.set_xlabel("RMSE over peak, %")
+        return figure
