@@ -8,6 +8,7 @@ parameter paths that are neutral until freed. Material tests and probings are tw
 import abc
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -112,6 +113,7 @@ class Bench(abc.ABC):
         candidates: by key.
         warnings: sentences for the reader.
         dear: True where a prediction is a simulation: noise is taken as recorded, and refits stop early.
+        numerics: of simulations: what mesh, step and penalty leave open (`probing_numerics.Numerics`), once known.
     """
 
     segments: Sequence[Segment]
@@ -125,6 +127,7 @@ class Bench(abc.ABC):
     candidates: dict[str, Candidate]
     warnings: list[str] = field(default_factory=list)
     dear: bool = False
+    numerics: Any = None
 
     @abc.abstractmethod
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:
@@ -145,6 +148,10 @@ class Bench(abc.ABC):
     def settings(self, candidate: Candidate, prediction: Float[np.ndarray, " N"]) -> Sequence[Mapping[str, float]]:
         """Shapes at which to score a candidate; a bench may read some from the residual (a period, a place)."""
         return candidate.grid
+
+    def burden(self, keys: Sequence[str]) -> int:
+        """How many searches and memories a prediction with these candidates nests; sets of many are not tried."""
+        return 0
 
     def mask(self, recordings: Sequence[str]) -> np.ndarray:
         """Rows of the long vector that belong to `recordings`."""

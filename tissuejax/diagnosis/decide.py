@@ -23,6 +23,7 @@ GAIN = 8.0
 CLOSE = 6.0
 NEEDED = 0.02
 LEFT = 0.15
+LEFT_DEAR, CLOSE_DEAR = 0.08, 0.01  # where a prediction is a simulation
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,11 @@ def decide(s: Search) -> Verdict:
     explained = tuple(1 - b / a if a > 0 else 1.0 for a, b in zip(e0, e1))
     reasons = []
     rivals: tuple[Refit, ...] = ()
-    if not chosen.keys:
+    numerical = s.bench.numerics
+    if not chosen.keys and not before.noise and numerical is not None and numerical.enough(empty):
+        kind = "nothing-missing"
+        reasons.append(f"mesh, step and penalty of the simulation account for {numerical.share:.0%} of what is left")
+    elif not chosen.keys:
         kind = "nothing-missing" if before.noise else "unexplained"
         reasons.append(
             "the residual of the base model is noise"
@@ -92,7 +97,7 @@ def decide(s: Search) -> Verdict:
         )
     else:
         total = 1 - sum(e1) / max(sum(e0), 1e-9)
-        poor = not after.noise and total < 1 - LEFT
+        poor = not after.noise and total < 1 - (LEFT_DEAR if s.bench.dear else LEFT)
         held = not after.noise and bool(s.bench.held_out) and explained[1] < 1 - 2 * LEFT and after.z_held > SIGNIFICANT
         if poor or held:
             kind = "unexplained"
@@ -105,10 +110,18 @@ def decide(s: Search) -> Verdict:
                 if k
                 and len(k) <= len(chosen.keys)
                 and s.names(k) != mine
-                and s.criterion(s.refits[k]) < s.criterion(chosen) + CLOSE
+                and s.criterion(s.refits[k]) < s.criterion(chosen) + close(s, chosen)
             )
             kind = "ambiguous" if rivals else "found"
     return Verdict(kind, chosen, rivals, explained, tuple(reasons), before, after, confidence(s, chosen))
+
+
+def close(s: Search, chosen: Refit) -> float:
+    """How near another set's criterion may come before the data can't tell it from the chosen one.
+
+    Of simulations, a share of what was explained: their error is no random number that more samples would average out.
+    """
+    return max(CLOSE, CLOSE_DEAR * (s.criterion(s.empty) - s.criterion(chosen))) if s.bench.dear else CLOSE
 
 
 def confidence(s: Search, chosen: Refit) -> float:

@@ -6,15 +6,20 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import jax
+import numpy as np
 
 from tissuejax.cache import keep_programs
 from tissuejax.diagnosis.decide import decide
 from tissuejax.diagnosis.material import MaterialBench
 from tissuejax.diagnosis.next_experiment import proposals
 from tissuejax.diagnosis.probing import ProbingBench
+from tissuejax.diagnosis.probing_map import stiffness_maps
+from tissuejax.diagnosis.probing_search import BUDGET as PROBING
+from tissuejax.diagnosis.probing_search import search_probing
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.diagnosis.search import Budget, search
 from tissuejax.diagnosis.sigma import sigmas
+from tissuejax.diagnosis.untimed import timed, without_clock
 from tissuejax.energies.catalogue import energy as named_energy
 from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.catalogue import experiment
@@ -22,8 +27,6 @@ from tissuejax.progress import Progress, Silent
 from tissuejax.recordings.files import read
 from tissuejax.recordings.recording import Sample
 from tissuejax.storage import write_json
-
-PROBING = Budget(most=2, beam=(1, 1), nominees=(3, 2), share=0.05, starts=1, iterations=4, tolerance=30.0)
 
 
 def diagnose(
@@ -59,12 +62,18 @@ def diagnose(
     base = named_energy(energy, ogden_form)
     kind = experiment(sample.recordings[fitted[0]].experiment).kind
     if kind == "probing":
-        bench, budget = ProbingBench.of(sample, base, fitted, held_out, effects), budget or PROBING
+        keep = None if out is None else Path(out) / "runs"
+        bench, budget = ProbingBench.of(sample, base, fitted, held_out, effects, keep), budget or PROBING
     else:
         sigma, more = sigmas(sample, (*fitted, *held_out))
         bench = MaterialBench.of(sample, base, fitted, held_out, sigma, effects)
         remarks += more
+        if not timed(sample):
+            bench.candidates = without_clock(bench.candidates)
+            remarks.append("no time was recorded: effects that act in time (relaxation, drift, aging) were not tried")
     bench.warnings += remarks
+    if bad := [f"{s.recording} {s.label}" for s in bench.segments if not np.all(np.isfinite(bench.y[s.rows]))]:
+        raise InputError(f"{sample.name}: {', '.join(bad)}: values that are not finite; leave these samples out")
     n = sum(len(s.time) for s in bench.segments if s.recording in fitted)
     if n <= len(bench.base):
         raise InputError(
@@ -72,7 +81,8 @@ def diagnose(
             "fit a smaller energy, or record more"
         )
     with (progress or Silent()).stage(f"diagnosing {sample.name}") as stage:
-        found = search(bench, budget, lambda note: stage.advance(note=note))
+        look = search_probing if kind == "probing" else search
+        found = look(bench, budget, lambda note: stage.advance(note=note))
     verdict = decide(found)
     ideas = [
         p
@@ -80,7 +90,12 @@ def diagnose(
         if kind == "homogeneous"
         for p in proposals(sample, base, bench, verdict.chosen, rival)
     ]
-    diagnosis = Diagnosis(sample.name, energy, found, verdict, time.perf_counter() - begun, ideas)
+    maps = []
+    if kind == "probing" and verdict.kind != "nothing-missing":
+        maps = stiffness_maps(bench, found.empty.values, found.empty.prediction)
+    diagnosis = Diagnosis(sample.name, energy, found, verdict, time.perf_counter() - begun, ideas, maps)
+    if kind == "probing":
+        bench.runs.forget()
     if out is not None:
         write_json(Path(out) / "result.json", diagnosis.as_dict())
         write_json(Path(out) / "remainder.json", diagnosis.remainders())

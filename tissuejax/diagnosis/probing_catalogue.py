@@ -58,12 +58,12 @@ def probing_entries(energy: float) -> list[Entry]:
             (Form("", ("k1", "angle"), {"angle": tuple(np.arange(4) * np.pi / 4)}),),
         ),
         (EnergyForm(terms=("C30", "C01")), (Form("", ("C30", "C01"), {}),)),
-        (Compressibility(), (Form("draining", ("drained", "time"), {"time": (2.0, 10.0)}),)),
+        (Compressibility(), (Form("draining", ("drained", "time"), {"time": (4.0,)}),)),
         (Aging(), (Form("", ("rate",), {}),)),
         (
             Drift(kind="probing", separate=True),
             (
-                Form("offset", tuple(axes[:3]), {}),
+                Form("", tuple(axes), {}),
                 Form("each recording", tuple(axes), {}, each=tuple(axes)),
             ),
         ),
@@ -73,8 +73,12 @@ def probing_entries(energy: float) -> list[Entry]:
         ),
         (MachineCompliance(), (Form("", ("compliance",), {}),)),
         (
-            ContactOffset(),
-            (Form("depth", ("depth",), {}), Form("depth and delay", ("depth", "delay"), {}, nominated=False)),
+            ContactOffset(separate=True),
+            (
+                Form("delay", ("delay",), {}),
+                Form("depth", ("depth",), {}),
+                Form("each recording", ("depth",), {}, each=("depth",)),
+            ),
         ),
         (Friction(), (Form("", ("coefficient",), {}),)),
         (Adhesion(), (Form("", ("strength", "reach"), {"reach": (2e-4,)}),)),
@@ -90,14 +94,20 @@ def probing_entries(energy: float) -> list[Entry]:
                 Form("thickness", ("thickness",), {}),
             ),
         ),
-        (Inclusion(), (Form("", ("contrast", "x", "y", "z", "radius"), {"radius": (6e-3,)}),)),
+        (
+            Inclusion(),
+            (
+                Form("round", ("contrast", "x", "y", "z", "radius"), {"radius": (6e-3,)}),
+                Form("flat", ("contrast", "x", "y", "z", "radius", "flatness"), {}, nominated=False),
+            ),
+        ),
     ]
     known = effects("probing")
     return [Entry(effect, forms, effect.name) for effect, forms in found if effect.name in known]
 
 
 def places(
-    sites: dict[str, Float[np.ndarray, "2"]], height: dict[str, float], depths: tuple[float, ...] = (0.3, 0.6)
+    sites: dict[str, Float[np.ndarray, "2"]], height: dict[str, float], depths: tuple[float, ...] = (0.25, 0.45, 0.7)
 ) -> list[dict[str, float]]:
     """Where an inclusion is looked for: under every site, at some shares of the thickness."""
     out = []

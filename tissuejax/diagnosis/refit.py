@@ -15,6 +15,8 @@ from scipy.optimize import lsq_linear
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.misfit import Misfit
 
+ENOUGH = 2e-3  # of chi-square: where a prediction is a simulation, a step that promises less is not taken
+
 
 @dataclass(frozen=True)
 class Refit:
@@ -93,10 +95,13 @@ class Descent:
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Whitened derivative of the prediction by x, with the rows of the priors."""
+        jac = self.bench.jacobian({**self.rest, **self.natural(x)}, self.paths, self.recordings)
+        return self.scaled(self.misfit.whiten(jac, self.recordings), x)
+
+    def scaled(self, jac: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """A whitened derivative by natural values turned into one by x, with the rows of the priors."""
         values = self.natural(x)
-        jac = self.bench.jacobian({**self.rest, **values}, self.paths, self.recordings)
-        factor = np.where(self.log, [values[p] for p in self.paths], 1.0)
-        jac = self.misfit.whiten(jac * factor, self.recordings)
+        jac = jac * np.where(self.log, [values[p] for p in self.paths], 1.0)
         if self.priors:
             rows = np.zeros((len(self.priors), len(self.paths)))
             for row, (i, _, s) in zip(rows, self.priors):
@@ -104,13 +109,20 @@ class Descent:
             jac = np.concatenate([jac, rows])
         return jac
 
-    def run(self, x: np.ndarray, iterations: int, tolerance: float) -> tuple[np.ndarray, float, np.ndarray, bool]:
+    def run(
+        self, x: np.ndarray, iterations: int, tolerance: float, jac: np.ndarray | None = None
+    ) -> tuple[np.ndarray, float, np.ndarray, bool]:
         """From x to (x, cost, prediction, converged).
 
         A Jacobian costs many predictions, so it is only corrected along steps that keep their promise (Broyden).
+
+        Args:
+            jac: the Jacobian at x (as `jacobian` gives it) where it is known already.
         """
         cost, r, prediction = self.objective(x)
-        damping, small, jac, age = 1e-3, 0, None, 0
+        # a Jacobian from elsewhere may lack what vanishes there (shapes at zero amplitude): good for one step
+        damping, small, age, given = 1e-3, 0, 0, jac is not None
+        dear = self.bench.dear
         for _ in range(iterations):
             if not np.isfinite(cost):
                 return x, cost, prediction, False
@@ -123,15 +135,19 @@ class Descent:
             right = q.T @ r
             size = np.linalg.norm(jac, axis=0)
             size = np.maximum(size, 1e-9 * np.max(size, initial=0.0) + 1e-6 / self.scale)
-            for _ in range(10):
+            for _ in range(4 if dear else 10):
                 a = np.vstack([t, np.diag(np.sqrt(damping) * size)])
                 step = bounded(a, np.concatenate([right, np.zeros(len(x))]), self.low - x, self.high - x)
                 trial = np.clip(x + step, self.low, self.high)
                 step = trial - x
+                left = r - jac @ step
+                promised = cost - float(left @ left)
+                if dear and promised < max(tolerance, ENOUGH * cost):
+                    return x, cost, prediction, True
                 new, r_new, p_new = self.objective(trial)
                 if new < cost or age > 0:
                     break
-                damping = max(damping * 8, 1e-6)
+                damping = max(damping * (40 if dear else 8), 1e-6)
                 if np.max(np.abs(step) / np.maximum(self.scale, np.abs(x)), initial=0.0) < 1e-9:
                     return x, cost, prediction, True
             else:
@@ -139,13 +155,11 @@ class Descent:
             if not new < cost:  # a corrected Jacobian failed: take a true one
                 jac = None
                 continue
-            left = r - jac @ step
-            promised = cost - float(left @ left)
             drop = cost - new
-            if drop > 0.7 * promised and age < 3 and step @ step > 0:
+            if drop > 0.7 * promised and age < 3 and step @ step > 0 and not given:
                 jac, age = jac + np.outer(left - r_new, step) / (step @ step), age + 1
             else:
-                jac = None
+                jac, given = None, False
             cost, x, r, prediction = new, trial, r_new, p_new
             damping = max(damping / 10, 1e-9)
             small = small + 1 if drop < tolerance else 0
@@ -190,17 +204,21 @@ def refit(
     iterations: int = 30,
     tolerance: float = 0.1,
     final: bool = True,
+    seed: np.ndarray | None = None,
 ) -> Refit:
     """Fit base and candidates `keys` from `start` (absent paths start at the bench's neutral values).
 
     Args:
         tolerance: stops when two steps in a row lower chi-square by less.
         final: False leaves standard errors and held-out recordings out, for trial starts.
+        seed: the whitened Jacobian at the start (natural coordinates, without priors) where it is known.
     """
     whole = {**bench.start, **start}
     paths = tuple(dict.fromkeys([*bench.base, *(p for key in keys for p in bench.candidates[key].paths)]))
     descent = Descent(bench, misfit, paths, bench.fitted, {})
-    x, cost, prediction, converged = descent.run(descent.point(whole), iterations, tolerance)
+    first = descent.point(whole)
+    known = None if seed is None else descent.scaled(seed, first)
+    x, cost, prediction, converged = descent.run(first, iterations, tolerance, known)
     values, own, std, at_bound = descent.natural(x), {}, {}, ()
     r = misfit.residual(prediction, bench.fitted)
     chi2 = float(r @ r) if np.isfinite(cost) else np.inf

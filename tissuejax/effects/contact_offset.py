@@ -15,22 +15,25 @@ from tissuejax.tled.scene import Scene
 class ContactOffset(Effect):
     """z_true(t) = z_recorded(t - delay) - depth. Neutral: both 0.
 
-    Reveals: force that starts before or after the recorded first touch, with the same shift at every site; a delay also
-    shifts the corners of the path. Blind: a single approach at one speed mixes depth and delay.
+    One depth for all recordings (a probe of another length), or with `separate` one for each (touch was judged anew).
+    Reveals: force that starts before or after the recorded first touch, by the same shift on the way in and out; a
+    delay also shifts the corners of the path. Blind: a single approach at one speed mixes depth and delay.
     """
 
     name: ClassVar[str] = "contact-offset"
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
-    reveals: ClassVar[str] = "force begins too early or too late, by the same depth at every site"
+    reveals: ClassVar[str] = "force begins too early or too late, by the same depth on the way in and out"
     blind: ClassVar[str] = "one approach at one speed can't tell depth from delay; material tests"
     source: ClassVar[str] = "Lister 2012, 2.2.1 (contact circuit)"
     amplitudes: ClassVar[tuple[str, ...]] = ("depth", "delay")
     order: ClassVar[int] = 0
+    separate: bool = False
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
+        lower = "how much lower the probe really was"
         return (
-            Parameter("depth", "m", 0.0, -3e-3, 3e-3, "how much lower the probe really was", scale=3e-4),
+            Parameter("depth", "m", 0.0, -3e-3, 3e-3, lower, scale=3e-4, each=self.separate),
             Parameter("delay", "s", 0.0, -0.5, 0.5, "how late the probe's clock is", scale=0.03),
         )
 

@@ -78,13 +78,16 @@ class ProbingPredictor(Predictor):
 
     def run(self, values: Values) -> dict[str, Simulated]:
         """The simulations behind `predict`, with their checks."""
-        bare = self.model.across(())
         thetas = {name: _vector(local(self.model, values, name)) for name in self.names}
-        jobs = [(_predict, bare, thetas[name], self.setups[name]) for name in self.names]
+        jobs = [self.job(values, name) for name in self.names]
         out = dict(zip(self.names, self._side_by_side(jobs, thetas), strict=True))
         for name, run in out.items():
             self._refuse_failed(name, run)
         return out
+
+    def job(self, values: Values, name: str) -> workers.Job:
+        """What simulates one recording, for `workers.run_all`: many predictions side by side. Gives a `Simulated`."""
+        return _predict, self.model.across(()), _vector(local(self.model, values, name)), self.setups[name]
 
     def jacobian(self, values: Values, paths: Sequence[str]) -> tuple[dict[str, Recording], Tangents]:
         """Prediction and derivatives; see `Predictor.jacobian`."""
@@ -108,7 +111,7 @@ class ProbingPredictor(Predictor):
             self._refuse_failed(name, run)
             recordings[name] = self._reported(name, run.channels)
             for row, i in enumerate(part):
-                tangents[paths[i]][name] = {channel: slope[row] for channel, slope in slopes.items()}
+                tangents[paths[i]][name] = {c: self.unpadded(name, c, slope[row]) for c, slope in slopes.items()}
         for name in self.names:
             if name not in recordings:  # no path acts in this recording
                 recordings |= self.of([name]).predict(values)
@@ -141,8 +144,16 @@ class ProbingPredictor(Predictor):
 
     def _reported(self, name: str, channels: Mapping[str, Array]) -> Recording:
         measured = self.sample.recordings[name]
-        told = {c: Channel(measured.channels[c].time, v, measured.channels[c].unit) for c, v in channels.items()}
+        told = {
+            c: Channel(measured.channels[c].time, self.unpadded(name, c, v), measured.channels[c].unit)
+            for c, v in channels.items()
+        }
         return Recording(name, measured.experiment, measured.inputs, told, measured.attributes)
+
+    def unpadded(self, name: str, channel: str, values: Array) -> Array:
+        """Values as simulated, cut to the samples (and markers) that recording and channel have."""
+        shape = np.shape(self.sample.recordings[name].channels[channel].values)
+        return values[tuple(slice(n) for n in shape)]
 
 
 def _parts(indices: np.ndarray, size: int) -> list[np.ndarray]:

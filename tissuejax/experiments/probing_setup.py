@@ -34,7 +34,9 @@ from tissuejax.tled.scene import Body, Clock, Markers, Probe, Scene, Settings, S
 from tissuejax.tled.shapes import Sphere
 
 DENSITY = 1060.0  # kg/m^3, soft tissue: inertia is nothing in a probing, so a guess serves where none is recorded
-FRAMES, SAMPLES, PATCH = 64, 256, 64  # series and patches are padded to multiples of these
+# What differs between recordings is padded to multiples of these, so that they share one compiled program
+FRAMES, SAMPLES, PATCH = 512, 2048, 64
+FORCES, SHOWN, MARKERS = 1024, 256, 12
 
 
 class Setup(eqx.Module):
@@ -43,7 +45,7 @@ class Setup(eqx.Module):
     Attributes:
         scene: the scene with every effect absent and placeholder parameter values.
         test: what effects need to know.
-        force_times, marker_times: sensor clocks, s (marker_times is empty without markers).
+        force_times, marker_times: sensor clocks, s, padded (marker_times is empty without markers).
         calm: weights (sum 1) of the frames out of contact, for the markers' rest.
         damping: mass damping over sqrt(shear modulus), 1/s per sqrt(Pa).
     """
@@ -97,7 +99,12 @@ def retimed(setup: Setup, settings: ProbingSettings) -> Setup:
     clock = setup.scene.clock
     steps = settings.changed(interval=float(clock.interval)).steps
     faster = Clock(
-        clock.start, clock.interval, jnp.asarray(settings.compression, clock.interval.dtype), clock.frames, steps
+        clock.start,
+        clock.interval,
+        jnp.asarray(settings.compression, clock.interval.dtype),
+        clock.frames,
+        steps,
+        clock.needed,
     )
     return eqx.tree_at(lambda s: s.scene.clock, setup, faster)
 
@@ -160,8 +167,9 @@ def _setup(model, sample, recording, settings, lobe: Lobe | None, touch: Contact
         where = np.where((np.isfinite(rest).all(1) | ~never)[:, None], rest, points[upper.nodes[0, 0]])
         placed = attach(where, points, upper)
         placed = nearest_nodes(where, points, upper) if settings.nearest_node else placed
-        on = Markers(placed.nodes, placed.weights, rest)
-        marker_times, shown = np.asarray(recording.channels["markers"].time, float), rest
+        shown = _padded(rest, MARKERS)
+        on = Markers(_padded(placed.nodes, MARKERS), _padded(placed.weights, MARKERS), shown)
+        marker_times = np.asarray(recording.channels["markers"].time, float)
         calm = _calm(frames_end, marker_times, touch)
     nodes = cells.shape[1]
     volumes = cell_volumes(points, cells, geometry.cell_type)
@@ -190,9 +198,15 @@ def _setup(model, sample, recording, settings, lobe: Lobe | None, touch: Contact
         first_touch=np.asarray(touch.first),
         rest=shown,
     )
+    force_times, marker_times = _padded(force_times, FORCES), _padded(marker_times, SHOWN)
     setup = Setup(scene, test, force_times, marker_times, calm, np.asarray(settings.damping * omega_over_root_mu))
     dtype = jnp.float32 if settings.precision == "float32" else jnp.float64
     return eqx.tree_at(lambda s: s.scene, setup, scene.cast(dtype))
+
+
+def _padded(series: np.ndarray, to: int) -> np.ndarray:
+    """With its last entry repeated up to a multiple of `to`."""
+    return np.concatenate([series, np.repeat(series[-1:], -len(series) % to, axis=0)])
 
 
 def _defaults(part) -> dict[str, np.ndarray]:
@@ -224,10 +238,11 @@ def _clock(recording, probe_time, settings) -> tuple[Clock, np.ndarray, np.ndarr
     interval = spacing if even else settings.interval
     begin = t[0] - 0.5 * interval
     last = max(t[-1], probe_time[-1] if "markers" in recording.channels else t[-1])
-    frames = int(np.ceil((last - begin) / interval))
-    frames += -frames % FRAMES
+    needed = int(np.ceil((last - begin) / interval)) + 1
+    frames = needed + -needed % FRAMES
     steps = settings.changed(interval=interval).steps
-    clock = Clock(np.asarray(begin), np.asarray(interval), np.asarray(settings.compression), frames, steps)
+    speed = np.asarray(settings.compression)
+    clock = Clock(np.asarray(begin), np.asarray(interval), speed, frames, steps, np.asarray(needed, np.int32))
     index = np.arange(frames)
     return clock, begin + interval * (index + 0.5), begin + interval * (index + 1.0)
 

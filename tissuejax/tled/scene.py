@@ -141,6 +141,9 @@ class Clock(eqx.Module):
     Frame k covers real time start + k * interval to start + (k + 1) * interval in `steps` steps; force, torque and
     reaction are means over a frame (time of its middle), markers are taken at its end. `compression` f runs the probe,
     the support and every relaxation f times as fast, which is right as long as inertia does not matter.
+
+    With `needed`, blocks of frames from that number on are left out and their series are zero: recordings of unlike
+    length share one program, and a short one does not pay for a long one.
     """
 
     start: Float[Array, ""]
@@ -148,6 +151,7 @@ class Clock(eqx.Module):
     compression: Float[Array, ""]
     frames: int = eqx.field(static=True)
     steps: int = eqx.field(static=True)
+    needed: Int[Array, ""] | None = None
 
     @property
     def step(self) -> Float[Array, ""]:

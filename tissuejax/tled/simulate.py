@@ -120,9 +120,24 @@ def proceed(m: Machine, state: State) -> Outcome:
     if _too_much_to_store(scene):
         block = jax.checkpoint(block, prevent_cse=False)
     drive = jax.tree.map(lambda x: x.reshape(blocks, length, clock.steps, 3), drives(scene, blocks * length))
-    state, ((felt, markers), checks) = jax.lax.scan(block, state, drive, length=blocks)
+    if clock.needed is None:
+        state, ((felt, markers), checks) = jax.lax.scan(block, state, drive, length=blocks)
+    else:
+        numbered = (jnp.arange(blocks), drive)
+        state, ((felt, markers), checks) = jax.lax.scan(_while_needed(block, length, clock.needed), state, numbered)
     felt, markers = jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:])[: clock.frames], (felt, markers))
     return _outcome(scene, felt, markers, checks, length, state)
+
+
+def _while_needed(block, length: int, needed: Int[Array, ""]):
+    """`block` for the numbered blocks that begin before the last needed frame; afterwards nothing moves."""
+
+    def numbered(state, x):
+        number, drive = x
+        nothing = jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), jax.eval_shape(block, state, drive)[1])
+        return jax.lax.cond(number * length < needed, block, lambda state, _: (state, nothing), state, drive)
+
+    return numbered
 
 
 def block_length(frames: int) -> int:

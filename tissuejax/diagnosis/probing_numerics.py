@@ -1,0 +1,76 @@
+"""Is it the simulation and not the tissue? The prediction again with mesh, step and penalty changed.
+
+From the change to the next setting the distance to the limit follows by the order of convergence. If these three
+changes (each with an amplitude of about one, together with the base's own parameters) take up the misfit, what the
+model lacks is resolution, and no effect may be named.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tissuejax.diagnosis.misfit import Misfit
+from tissuejax.diagnosis.probing import ProbingBench
+from tissuejax.diagnosis.probing_runs import FINE
+from tissuejax.diagnosis.quality import TOLERATED
+from tissuejax.diagnosis.refit import Refit
+from tissuejax.diagnosis.score import complement, gain
+from tissuejax.fitting.probed import REMAINS
+
+MOSTLY = 0.6  # share of the misfit that has to be numerical before nothing else is looked for
+MOST = 1.5  # of the estimated distance to the limit: farther off, it is no numerical error
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """What mesh, step and penalty leave open at one fit.
+
+    Attributes:
+        rms: root mean square over sigma of each choice's distance to its limit, by channel.
+        gain: chi-square of the fitted recordings that the three take up, beside the base's parameters.
+        share: of the excess.
+        amplitudes: in units of the estimated distance to the limit.
+    """
+
+    rms: dict[str, dict[str, float]]
+    gain: float
+    share: float
+    amplitudes: dict[str, float]
+
+    def enough(self, at: Refit) -> bool:
+        """Whether the misfit of the base is a numerical error: nothing beyond it is left."""
+        left = (at.chi2 - self.gain) / max(at.n - at.k - 3, 1)
+        return self.share > MOSTLY and left < TOLERATED
+
+    def as_dict(self) -> dict:
+        """As in `result.json`."""
+        return {
+            "rms_over_sigma": self.rms,
+            "chi2_explained": self.gain,
+            "share_of_misfit": self.share,
+            "amplitudes": self.amplitudes,
+        }
+
+
+def numerics(bench: ProbingBench, misfit: Misfit, at: Refit) -> Numerics:
+    """The numerical error at a fit, from three more predictions of the fitted recordings."""
+    names, ready = bench.fitted, bench.runs.ready
+    for choice, settings in ready[FINE].settings.varied.items():
+        if choice not in ready:
+            ready[choice] = ready[FINE].with_settings(settings)
+    told = bench.runs.many([(bench.at(at.values), names, kind) for kind in (FINE, *REMAINS)])
+    changes = {choice: REMAINS[choice] * (p - told[0]) for choice, p in zip(REMAINS, told[1:], strict=True)}
+    rms: dict[str, dict[str, float]] = {}
+    for choice, d in changes.items():
+        for channel in dict.fromkeys(s.channel for s in bench.segments):
+            z = np.concatenate([(d / bench.sigma)[s.rows] for s in misfit.rows(names) if s.channel == channel])
+            rms.setdefault(choice, {})[channel] = float(np.sqrt(np.mean(z**2)))
+    r = misfit.residual(at.prediction, names)
+    excess = max(float(r @ r) - (at.n - at.k), 1.0)
+    basis = complement(misfit.whiten(bench.jacobian(at.values, bench.base, names), names))
+    columns = misfit.whiten(np.stack(list(changes.values()), axis=1), names)
+    good = np.all(np.isfinite(columns))
+    columns = np.where(good, columns, 0.0)
+    r, columns = (x - basis @ (basis.T @ x) for x in (r, columns))
+    taken, amplitudes = gain(r, columns, np.full(3, -MOST), np.full(3, MOST))
+    return Numerics(rms, taken, min(taken / excess, 1.0), dict(zip(changes, amplitudes.tolist())))

@@ -1,0 +1,158 @@
+"""The simulations behind a probing bench: each run once, remembered, kept on disk, side by side on the cores.
+
+One recording at one set of values is one run. An effect at its neutral value changes no bit, so effects are compiled
+together in groups (few programs), and values of an effect whose amplitudes are all zero do not count. A diagnosis that
+was stopped and is started again asks for the same runs in the same order and finds them on disk.
+"""
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from tissuejax.diagnosis.bench import Segment
+from tissuejax.diagnosis.probing_series import picked
+from tissuejax.effects.effect import Effect
+from tissuejax.experiments import workers
+from tissuejax.experiments.probing_predictor import ProbingPredictor
+from tissuejax.model import Model
+from tissuejax.storage import replacing
+
+# The first group is in every program. Histories are dear in run time and stay apart.
+GROUPS = (
+    ("aging", "clock-lag", "contact-offset", "drift", "inclusion", "machine-compliance", "periodic", "registration"),
+    ("base-slip", "capsule"),
+    ("compressibility", "softening", "viscoelasticity"),
+    ("adhesion", "friction"),
+    ("anisotropy", "energy-form"),
+    ("gravity",),
+)
+ROUGH = (12, 12, 5)  # elements of the mesh for differences
+FINE, COARSE = "fine", "coarse"
+
+Asked = tuple[Mapping[str, float], tuple[str, ...], str]  # values, recordings, which simulation
+
+
+@dataclass
+class Runs:
+    """Simulations of one sample.
+
+    Attributes:
+        ready: the prepared simulations, by their name (`FINE`, `COARSE`, or a variation to compare with).
+        effects: by name.
+        segments: of the bench; y its measurements.
+        finite: which samples of its channel a segment holds.
+        folder: where runs are kept; None keeps them in memory only.
+        told: called after every batch with the number of runs done so far.
+    """
+
+    ready: dict[str, ProbingPredictor]
+    effects: Mapping[str, Effect]
+    segments: Sequence[Segment]
+    y: Float[np.ndarray, " N"]
+    finite: Mapping[int, np.ndarray]
+    folder: Path | None = None
+    told: Callable[[int], None] = lambda _: None
+    count: int = 0
+    _known: dict[tuple, np.ndarray] = field(default_factory=dict)
+    _models: dict[tuple, ProbingPredictor] = field(default_factory=dict)
+    _mark: str = ""
+
+    def __post_init__(self):
+        one = self.ready[FINE]
+        self.rows = {
+            n: slice(min(s.rows.start for s in own), max(s.rows.stop for s in own))
+            for n in one.names
+            for own in [[s for s in self.segments if s.recording == n]]
+        }
+        told = repr((one.model, [(k, p.settings) for k, p in self.ready.items()], list(self.effects)))
+        self._mark = hashlib.sha256(told.encode() + self.y.tobytes()).hexdigest()
+
+    def many(self, asked: Sequence[Asked]) -> list[Float[np.ndarray, " N"]]:
+        """Predictions, one long vector each: as measured where a recording wasn't asked for, NaN where a run failed."""
+        keys = [[self._key(values, r, kind) for r in recordings] for values, recordings, kind in asked]
+        missing = [k for k in dict.fromkeys(k for row in keys for k in row) if not self._find(k)]
+        if missing:
+            jobs = [self.job(dict(values), r, kind) for r, kind, values in missing]
+            processes = self.ready[FINE].settings.processes
+            for key, run in zip(missing, workers.run_all(jobs, processes), strict=True):
+                self._keep(key, self._cut(key[0], run))
+            self.count += len(missing)
+            self.told(self.count)
+        out = []
+        for row in keys:
+            told = self.y.copy()
+            for key in row:
+                told[self.rows[key[0]]] = self._known[key]
+            out.append(told)
+        return out
+
+    def job(self, values: Mapping[str, float], recording: str, kind: str) -> workers.Job:
+        """What simulates one recording."""
+        _, _, counted = self._key(values, recording, kind)
+        return self._predictor(kind, counted).job(dict(counted), recording)
+
+    def _key(self, values: Mapping[str, float], recording: str, kind: str) -> tuple:
+        """Recording, simulation, and the values that count there: those of effects that are on, sorted."""
+        others = [n for n in self.rows if n != recording]
+        own = {p: float(v) for p, v in values.items() if p.rsplit(".", 1)[-1] not in others}
+        on = {
+            p.split(".")[1]
+            for p, v in own.items()
+            if v != 0 and p.startswith("effects.") and p.split(".")[2] in self.effects[p.split(".")[1]].amplitudes
+        }
+        counted = {p: v for p, v in own.items() if not p.startswith("effects.") or p.split(".")[1] in on}
+        return recording, kind, tuple(sorted(counted.items()))
+
+    def _predictor(self, kind: str, values: Sequence[tuple[str, float]]) -> ProbingPredictor:
+        named = {p.split(".")[1] for p, _ in values if p.startswith("effects.")}
+        groups = tuple(g for i, g in enumerate(GROUPS) if i == 0 or named.intersection(g))
+        if (kind, groups) not in self._models:
+            known = set(sum(GROUPS, ()))
+            lone = tuple(sorted(n for n in named if n not in known))
+            chosen = [self.effects[n] for n in (*sum(groups, ()), *lone) if n in self.effects]
+            one = self.ready[kind]
+            model = Model(one.model.energy, one.model.volumetric, tuple(chosen)).across(tuple(self.rows))
+            made = ProbingPredictor(model, one.sample, one.names, one.settings, one.setups)
+            if lone:
+                return made
+            self._models[kind, groups] = made
+        return self._models[kind, groups]
+
+    def _cut(self, recording: str, run) -> np.ndarray:
+        out = np.empty(self.rows[recording].stop - self.rows[recording].start)
+        begin = self.rows[recording].start
+        for s in self.segments:
+            if s.recording == recording:
+                told = self.ready[FINE].unpadded(recording, s.channel, np.asarray(run.channels[s.channel]))
+                out[s.rows.start - begin : s.rows.stop - begin] = picked(told, s, self.finite)
+        return np.full_like(out, np.nan) if int(run.failed) >= 0 else out
+
+    def _path(self, key: tuple) -> Path | None:
+        if self.folder is None:
+            return None
+        return self.folder / f"{hashlib.sha256((self._mark + repr(key)).encode()).hexdigest()[:32]}.npy"
+
+    def _find(self, key: tuple) -> bool:
+        path = self._path(key)
+        if key not in self._known and path is not None and path.exists():
+            self._known[key] = np.load(path)
+        return key in self._known
+
+    def _keep(self, key: tuple, told: np.ndarray) -> None:
+        self._known[key] = told
+        path = self._path(key)
+        if path is not None:
+            with replacing(path) as temporary, open(temporary, "wb") as file:
+                np.save(file, told)
+
+    def forget(self) -> None:
+        """The diagnosis is finished: remove what was kept on disk."""
+        if self.folder is not None and self.folder.exists():
+            for path in self.folder.glob("*.npy"):
+                path.unlink(missing_ok=True)
+            if not any(self.folder.iterdir()):
+                self.folder.rmdir()

@@ -1,0 +1,165 @@
+"""The search where every prediction is a simulation: score, try one step, refit those that keep their promise.
+
+A linear score ranks by what a small change would do; far from the truth (an inclusion five times as stiff) it ranks
+poorly. So the best few candidates take one real step, from the derivatives that the score has computed already, at the
+price of one or two predictions each. Only those whose step did about as well as the best one are refitted to the end.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from tissuejax.diagnosis.bench import Bench
+from tissuejax.diagnosis.misfit import white
+from tissuejax.diagnosis.probing import ProbingBench
+from tissuejax.diagnosis.probing_numerics import numerics
+from tissuejax.diagnosis.probing_runs import COARSE, FINE
+from tissuejax.diagnosis.quality import quality
+from tissuejax.diagnosis.refit import Refit, refit
+from tissuejax.diagnosis.score import Score
+from tissuejax.diagnosis.search import Budget, Search
+from tissuejax.errors import NotConverged
+
+BUDGET = Budget(most=2, beam=(1, 1), nominees=(3, 2), share=0.03, starts=1, iterations=8, tolerance=20.0)
+TRIED = 6  # candidates that take a step
+RIVALS = 0.6  # of the best step's gain: the least for a refit
+CLOSE = 0.85  # the same, once one refit leaves nothing but noise
+
+
+def search_probing(bench: ProbingBench, budget: Budget, report: Callable[[str], None] = lambda _: None) -> Search:
+    """Fit the base, then add effects one at a time, as long as something is left; see the module's text.
+
+    Raises:
+        NotConverged: the base model can't be simulated at its start.
+    """
+    s = Search(bench, white(bench), budget, report=report)
+    report("base model")
+    bench.kind = COARSE  # most of the way on the cheap mesh
+    near = refit(bench, s.misfit, (), {}, iterations=2 * budget.iterations, tolerance=budget.tolerance, final=False)
+    bench.kind = FINE
+    first = refit(bench, s.misfit, (), near.values, iterations=budget.iterations, tolerance=budget.tolerance)
+    if not math.isfinite(first.chi2):
+        raise NotConverged(
+            f"the base model can't be simulated for {', '.join(bench.fitted)}: name another --energy, or look at the "
+            "mesh and the path of the probe with `tissuejax inspect`"
+        )
+    s.refits[frozenset()] = first
+    report("numerical error")
+    bench.numerics = numerics(bench, s.misfit, first)
+    at = frozenset()
+    for size in range(budget.most):
+        parent = s.refits[at]
+        report(f"scores beside {' + '.join(parent.keys) or 'the base'} (chi-square {parent.chi2 / parent.n:.3g})")
+        s.score(at)
+        if quality(s, parent).noise or (not at and bench.numerics.enough(first)):
+            break
+        grown = grow(s, at, budget.nominees[min(size, len(budget.nominees) - 1)])
+        if not grown:
+            break
+        best = min(grown, key=lambda k: s.criterion(s.refits[k]))
+        best = richer(s, best)
+        if s.criterion(s.refits[best]) >= s.criterion(parent):
+            break
+        if len(best) > 1:
+            leave_out(s, best)
+        at = best
+        if quality(s, s.refits[best]).noise:
+            break
+    return s
+
+
+def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
+    """The set with one effect more, for the few effects that explain most; refitted."""
+    parent, trials = s.refits[at], []
+    for score in nominees(s, at):
+        s.report(f"one step: {' + '.join([*parent.keys, score.key])}")
+        trial = step(s, parent, score)
+        if math.isfinite(trial.chi2):
+            trials.append((trial.chi2, score.key, trial))
+    trials.sort(key=lambda t: t[0])
+    grown: list[frozenset] = []
+    for chi2, key, trial in trials[:most]:
+        done = any(quality(s, s.refits[k]).noise for k in grown)
+        if parent.chi2 - chi2 < (CLOSE if done else RIVALS) * (parent.chi2 - trials[0][0]):
+            break
+        s.report(" + ".join(trial.keys))
+        keys = at | {key}
+        s.refits[keys] = finish(s, trial.keys, trial)
+        grown.append(keys)
+    return grown
+
+
+def nominees(s: Search, at: frozenset) -> list[Score]:
+    """What may explain enough for its number of parameters, best first, two forms of an effect at most."""
+    parent, price = s.refits[at], math.log(max(s.misfit.effective(s.bench.fitted), 3.0))
+    least = s.budget.share * max(parent.chi2 - parent.n, 0.0)
+    out, count = [], {}
+    for score in s.score(at):
+        c = s.bench.candidates[score.key]
+        if score.gain < max(least, price * len(c.paths)) or count.get(c.name, 0) >= 2:
+            continue
+        count[c.name] = count.get(c.name, 0) + 1
+        out.append(score)
+    return out[:TRIED]
+
+
+def step(s: Search, parent: Refit, score: Score) -> Refit:
+    """One step of base, set and a new candidate together, with derivatives at the parent's fit."""
+    bench, candidate, names = s.bench, s.bench.candidates[score.key], s.bench.fitted
+    old = bench.jacobian(parent.values, tuple(parent.values), names)
+    new = bench.columns(parent.values, [(score.setting, a) for a in candidate.amplitudes])
+    still = np.zeros((len(bench.y), len(candidate.shapes)))  # shapes mean nothing at zero amplitude
+    seed = s.misfit.whiten(np.concatenate([old, new, still], axis=1), names)
+    start = {**parent.values, **score.setting}
+    return refit(bench, s.misfit, (*parent.keys, score.key), start, iterations=1, final=False, seed=seed)
+
+
+def finish(s: Search, keys: tuple[str, ...], start: Refit) -> Refit:
+    """A refit to the end, from where a trial or another form came to."""
+    budget = s.budget
+    values = {**start.values, **start.own}
+    return refit(s.bench, s.misfit, keys, values, iterations=budget.iterations, tolerance=budget.tolerance)
+
+
+def richer(s: Search, at: frozenset) -> frozenset:
+    """The set with each effect in a richer form, as long as something is left that it explains."""
+    for _ in range(3):
+        parent = s.refits[at]
+        if quality(s, parent).noise:
+            return at
+        for old in parent.keys:
+            for new in s.bench.candidates[old].beside:
+                keys = at - {old} | {new}
+                more = len(s.bench.candidates[new].paths) > len(s.bench.candidates[old].paths)
+                if more and keys not in s.refits:
+                    s.report(" + ".join(new if k == old else k for k in parent.keys))
+                    start = Refit(**{**vars(parent), "values": spread(s.bench, parent.values, new)})
+                    s.refits[keys] = finish(s, tuple(new if k == old else k for k in parent.keys), start)
+        forms = [k for k in s.refits if s.names(k) == s.names(at)]
+        best = min(forms, key=lambda k: s.criterion(s.refits[k]))
+        if best == at:
+            return at
+        at = best
+    return at
+
+
+def spread(bench: Bench, values: dict[str, float], form: str) -> dict[str, float]:
+    """Values for a form whose parameters differ between recordings, from those common to all."""
+    out = dict(values)
+    for path in (*bench.candidates[form].paths, *bench.candidates[form].held):
+        common = ".".join(path.split(".")[:3])
+        if path not in out and common != path and common in values:
+            out[path] = values[common]
+    return out
+
+
+def leave_out(s: Search, at: frozenset) -> None:
+    """Refits of a set without each of its effects, so that none stays that was only a stepping stone."""
+    parent = s.refits[at]
+    for key in parent.keys:
+        smaller = at - {key}
+        if smaller not in s.refits:
+            order = tuple(k for k in parent.keys if k != key)
+            s.report(" + ".join(order))
+            s.refits[smaller] = finish(s, order, parent)

@@ -1,0 +1,82 @@
+"""The long vector of a probing bench: every component of force and markers as a segment, with its sigma.
+
+Sigma is noise and numerical error in quadrature. The numerical one is what mesh, step and penalty leave open, a share
+of the signal at each time (measured against refinements and another solver: 1 to 2 % of the force).
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from tissuejax.diagnosis.bench import Segment
+from tissuejax.experiments.probing_predictor import ProbingPredictor
+from tissuejax.recordings.recording import Sample
+
+NUMERICAL = {"force": 0.012, "markers": 0.02}  # share of the signal that mesh, step and penalty leave open
+CHANNELS = ("force", "markers")
+FEWEST = 8  # samples of a series worth having
+
+
+def series(sample: Sample, ready: ProbingPredictor) -> tuple[list[Segment], np.ndarray, np.ndarray]:
+    """All force and marker series cut into segments, with measurement and sigma."""
+    segments, ys, sigmas, at = [], [], [], 0
+    for name in ready.names:
+        r = sample.recordings[name]
+        t, z = np.asarray(r.inputs["probe/time"], float), np.asarray(r.inputs["probe/position"], float)[:, 2]
+        touch = float(np.interp(float(ready.setups[name].test.first_touch), t, z))
+        for channel in CHANNELS:
+            if channel not in r.channels:
+                continue
+            ch = r.channels[channel]
+            time = np.asarray(ch.time, float)
+            flat = np.asarray(ch.values, float).reshape(len(time), -1)
+            noise = float(ch.noise_std or 0.01 * np.nanstd(flat))
+            for j in range(flat.shape[1]):
+                good = np.isfinite(flat[:, j])
+                if good.sum() < FEWEST:
+                    continue
+                axis = "xyz"[j % 3]
+                component = axis if channel == "force" else f"marker {j // 3} {axis}"
+                rows = slice(at, at + int(good.sum()))
+                at = rows.stop
+                depth = np.maximum(touch - np.interp(time[good], t, z), 0.0)
+                segments.append(Segment(name, channel, component, rows, time[good], ch.unit, depth, "depth", "m"))
+                ys.append(flat[good, j])
+                sigmas.append(np.hypot(noise, NUMERICAL[channel] * _signal(channel, flat, j)[good]))
+    return segments, np.concatenate(ys), np.concatenate(sigmas)
+
+
+def _signal(channel: str, flat: np.ndarray, j: int) -> np.ndarray:
+    """Size of the force, or of the displacement of the marker that column j belongs to, at every time."""
+    if channel == "force":
+        return np.linalg.norm(np.nan_to_num(flat), axis=1)
+    here = flat[:, 3 * (j // 3) : 3 * (j // 3) + 3]
+    early = here[: max(len(here) // 10, 5)]
+    rest = np.nanmedian(early if np.isfinite(early).any() else here, axis=0)
+    return np.linalg.norm(np.nan_to_num(here - rest), axis=1)
+
+
+def kept_samples(sample: Sample, segments: Sequence[Segment]) -> dict[int, np.ndarray]:
+    """Which samples of its channel a segment holds, by the start of its rows."""
+    out = {}
+    for s in segments:
+        values = np.asarray(sample.recordings[s.recording].channels[s.channel].values, float)
+        out[s.rows.start] = np.isfinite(values.reshape(len(values), -1)[:, column(s)])
+    return out
+
+
+def picked(values: np.ndarray, s: Segment, finite: Mapping) -> np.ndarray:
+    """The rows of a segment out of a channel's full array."""
+    flat = values.reshape(len(values), -1)
+    return flat[finite[s.rows.start], column(s)]
+
+
+def put(full: np.ndarray, s: Segment, finite: Mapping, vector: np.ndarray) -> None:
+    """The reverse: a segment's rows of the long vector into a channel's full array."""
+    full.reshape(len(full), -1)[finite[s.rows.start], column(s)] = vector[s.rows]
+
+
+def column(s: Segment) -> int:
+    """Column of a segment in its channel's array, all trailing axes flat."""
+    axis = "xyz".index(s.component[-1])
+    return axis if s.channel == "force" else 3 * int(s.component.split()[1]) + axis
