@@ -30,21 +30,26 @@ RESULT = {
             "held_out_chi2_per_sample": 1.2,
         },
     ],
-    "sets": [{"effects": ["slack", "drift"], "criterion": 0.0}, {"effects": ["aging"], "criterion": 50.0}],
+    "sets": [
+        {"effects": ["aging"], "information_criterion": 80.0, "held_out_chi2_per_sample": 9.0},
+        {"effects": ["slack", "drift/each recording"], "information_criterion": 30.0, "held_out_chi2_per_sample": 1.1},
+        {"effects": [], "information_criterion": 99.0, "held_out_chi2_per_sample": 4.0},
+    ],
     "before": {"r4": {"nominal_stress": {"chi2_per_sample": 4.0, "role": "held out"}}},
 }
 
 
 def test_each_criterion_names_its_own_favourite():
-    assert rivals.named_by_score(RESULT) == ("aging",)
-    assert rivals.named_by_refit(RESULT) == ("slack",)
-    assert rivals.named_by_hold_out(RESULT) == ("drift",)
-    assert rivals.named_by_all_subsets(RESULT) == ("slack", "drift")
+    assert rivals.by_score(RESULT) == (("aging",), 9.0)
+    assert rivals.by_refit(RESULT) == (("slack",), 1.5)
+    assert rivals.by_hold_out(RESULT) == (("drift",), 1.2)
+    assert rivals.by_all_subsets(RESULT) == (("slack", "drift"), 1.1)
 
 
 def test_nothing_to_name():
     quiet = {"candidates": [], "sets": [], "before": {}}
-    assert rivals.named_by_score(quiet) == rivals.named_by_refit(quiet) == rivals.named_by_hold_out(quiet) == ()
+    for ask in (rivals.by_score, rivals.by_refit, rivals.by_hold_out, rivals.by_all_subsets):
+        assert ask(quiet) == ((), np.inf)
 
 
 def test_gaussian_process_learns_a_drift(tmp_path):

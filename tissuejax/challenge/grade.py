@@ -17,6 +17,7 @@ from tissuejax.errors import InputError
 from tissuejax.storage import write_json, write_text
 
 EDGES = (0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, math.inf)
+STATED = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0)  # bins of stated confidence
 VISIBLE = 3.0  # times the noise: from here on the aims apply
 
 
@@ -157,17 +158,16 @@ def by_size(marks: list[Mark]) -> list[dict]:
     return rows
 
 
-def calibration(marks: list[Mark], bins: int = 5) -> dict:
-    """Stated confidence against how often it was right, over answers that name something, and the Brier score."""
-    stated = [m for m in marks if m.verdict in ("found", "ambiguous") and math.isfinite(m.confidence)]
+def calibration(marks: list[Mark]) -> dict:
+    """Stated confidence against how often the answer was right, over all answers, and the Brier score."""
+    stated = [m for m in marks if math.isfinite(m.confidence)]
     rows = []
-    for i in range(bins):
-        low, high = i / bins, (i + 1) / bins
-        here = [m for m in stated if low <= m.confidence < high or (i == bins - 1 and m.confidence == 1)]
+    for low, high in zip(STATED, STATED[1:]):
+        here = [m for m in stated if low <= m.confidence < high or (high == 1 and m.confidence == 1)]
         if here:
             mean = float(np.mean([m.confidence for m in here]))
-            rows.append({"from": low, "to": high, "stated": mean} | rate(here, lambda m: m.exact))
-    brier = float(np.mean([(m.confidence - m.exact) ** 2 for m in stated])) if stated else None
+            rows.append({"from": low, "to": high, "stated": mean} | rate(here, lambda m: m.right))
+    brier = float(np.mean([(m.confidence - m.right) ** 2 for m in stated])) if stated else None
     return {"bins": rows, "brier": brier, "of": len(stated)}
 
 

@@ -18,34 +18,50 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 from tissuejax.challenge.specimen import Trial
 from tissuejax.challenge.strengths import columns
 
+Answer = tuple[tuple[str, ...], float]
+"""Names, and chi-square per sample on the held-out recording once they are refitted."""
 
-def named_by_score(result: dict, least: float = 12.0) -> tuple[str, ...]:
+
+def by_score(result: dict, least: float = 12.0) -> Answer:
     """Score ranking alone: the candidate of largest linear gain, if it beats `least`; no refit, no abstention."""
-    scored = [c for c in result["candidates"] if c.get("score") is not None]
-    best = max(scored, key=lambda c: c["score"], default=None)
-    return (best["name"],) if best and best["score"] > least else ()
+    best = max(_with(result, "score"), key=lambda c: c["score"], default=None)
+    return _answer(result, best if best and best["score"] > least else None)
 
 
-def named_by_refit(result: dict, least: float = 8.0) -> tuple[str, ...]:
+def by_refit(result: dict, least: float = 8.0) -> Answer:
     """Refit alone: the single candidate whose refit fits best in sample, if it lowers the criterion by `least`."""
-    tried = [c for c in result["candidates"] if c.get("refit_chi2_per_sample") is not None]
-    best = min(tried, key=lambda c: c["refit_chi2_per_sample"], default=None)
-    return (best["name"],) if best and (best.get("criterion") or 0.0) < -least else ()
+    best = min(_with(result, "refit_chi2_per_sample"), key=lambda c: c["refit_chi2_per_sample"], default=None)
+    return _answer(result, best if best and (best.get("criterion") or 0.0) < -least else None)
 
 
-def named_by_hold_out(result: dict, before: float | None = None) -> tuple[str, ...]:
+def by_hold_out(result: dict) -> Answer:
     """Hold-out alone: the single candidate with the smallest held-out error, if smaller than the base model's."""
-    if before is None:
-        before = held_out_before(result)
-    tried = [c for c in result["candidates"] if c.get("held_out_chi2_per_sample") is not None]
-    best = min(tried, key=lambda c: c["held_out_chi2_per_sample"], default=None)
-    return (best["name"],) if best and best["held_out_chi2_per_sample"] < before else ()
+    key = "held_out_chi2_per_sample"
+    best = min(_with(result, key), key=lambda c: c[key], default=None)
+    return _answer(result, best if best and best[key] < held_out_before(result) else None)
 
 
-def named_by_all_subsets(result: dict) -> tuple[str, ...]:
-    """The set of smallest criterion among all sets refitted, whatever else: information criterion without a verdict."""
-    best = min(result.get("sets", ()), key=lambda s: s["criterion"], default={"effects": ()})
-    return tuple(dict.fromkeys(key.split(":")[0].split("/")[0] for key in best["effects"]))
+def by_all_subsets(result: dict) -> Answer:
+    """The set of smallest Schwarz criterion on the fitted recordings among all refitted; no hold-out, no verdict."""
+    best = min(result.get("sets", ()), key=lambda s: s["information_criterion"], default=None)
+    if best is None or not best["effects"]:
+        return (), held_out_before(result)
+    return tuple(dict.fromkeys(key.split("/")[0] for key in best["effects"])), _held(best)
+
+
+def _with(result: dict, key: str) -> list[dict]:
+    return [c for c in result["candidates"] if c.get(key) is not None]
+
+
+def _answer(result: dict, candidate: dict | None) -> Answer:
+    if candidate is None:
+        return (), held_out_before(result)
+    return (candidate["name"],), _held(candidate)
+
+
+def _held(found: dict) -> float:
+    value = found.get("held_out_chi2_per_sample")
+    return math.nan if value is None else value
 
 
 def held_out_before(result: dict) -> float:

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import ClassVar
 
+from tissuejax.challenge.compare import compare
 from tissuejax.challenge.grade import grade
 from tissuejax.challenge.make import KINDS, make
 from tissuejax.challenge.run import run
@@ -22,16 +23,18 @@ class ChallengeCommand(Command):
 Measure the diagnosis like a medical test. `make` draws cases from a seed (material tests from closed forms, probing by
 an implicit finite-element solver; neither shares code with the diagnosis), writes the recordings, seals the truth in a
 file of its own and keeps that file's hash. `run` diagnoses case by case and goes on where it was interrupted. `grade`
-checks the hash, opens the truth and writes graded.csv, confusion.csv, by_size.csv, graded.json and two figures.
+checks the hash, opens the truth and writes graded.csv, confusion.csv, by_size.csv, graded.json and figures. `rivals`
+says what simpler ways of answering would have said on the same cases.
 
   tissuejax challenge make out/challenge --kind material --count 210 --seed 7
   tissuejax challenge run out/challenge --jobs 2
   tissuejax challenge grade out/challenge --out fits/challenge/material
+  tissuejax challenge rivals out/challenge --out fits/challenge/material
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
         """What to do, the challenge's folder, and the options of each."""
-        parser.add_argument("action", choices=("make", "run", "grade"), help="what to do")
+        parser.add_argument("action", choices=("make", "run", "grade", "rivals"), help="what to do")
         parser.add_argument("folder", type=Path, metavar="FOLDER", help="the challenge")
         parser.add_argument(
             "--kind", choices=KINDS, default="material", help="make: material tests (default) or probing"
@@ -41,10 +44,10 @@ checks the hash, opens the truth and writes graded.csv, confusion.csv, by_size.c
         parser.add_argument("--jobs", "-j", type=int, default=1, metavar="N", help="make, run: processes (default 1)")
         parser.add_argument("--case", action="append", default=[], metavar="NAME", help="run: only this case (repeat)")
         parser.add_argument("--again", action="store_true", help="run: diagnose again what has a result")
-        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="grade: where to write (default: FOLDER)")
+        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="grade, rivals: where to write")
 
     def run(self, given: argparse.Namespace) -> Reply:
-        """Do one of the three."""
+        """Do one of the four."""
         if given.action == "make":
             made = make(given.folder, given.kind, given.count, given.seed, given.jobs, for_terminal())
             text = (
@@ -57,6 +60,9 @@ checks the hash, opens the truth and writes graded.csv, confusion.csv, by_size.c
             return Reply(
                 {"results": record}, f"{len(results)} cases answered; next: tissuejax challenge grade {given.folder}"
             )
+        if given.action == "rivals":
+            found = compare(given.folder, given.out, progress=for_terminal())
+            return Reply(found, (given.out or given.folder).joinpath("rivals.csv").read_text())
         found = grade(given.folder, given.out)
         figures(found, given.out or given.folder)
         lines = [f"{found['answered']} of {found['cases']} cases answered", ""]

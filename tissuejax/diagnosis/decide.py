@@ -4,7 +4,8 @@ Order of the questions, each with its own number:
 1. Is anything missing? The base fit's whitened chi-square and correlation against pure noise, in every recording,
    and whether any set lowers the criterion by more than `GAIN`.
 2. Which set? The smallest criterion; then every effect is asked whether it is needed: its removal must cost more than
-   `GAIN` and a share `NEEDED` of the misfit, or reach noise level where the smaller set doesn't.
+   `GAIN` and a share `NEEDED` of the misfit, or reach noise level where the smaller set doesn't, and the less it
+   explains the more the held-out recordings have to agree.
 3. Does it explain? What is left must be noise, or at most a share `LEFT` of what was missing, in the fitted recordings
    and in the held-out ones. Otherwise something is missing that the catalogue has no name for.
 4. Could it be another? Sets of no more effects whose criterion is within `CLOSE` can't be told apart by these data.
@@ -22,6 +23,7 @@ from tissuejax.diagnosis.search import Search, best_of_each
 GAIN = 8.0
 CLOSE = 6.0
 NEEDED = 0.02
+HELPLESS = 0.2  # share from which an effect may do without helping the held-out recordings
 LEFT = 0.15
 LEFT_DEAR, CLOSE_DEAR = 0.08, 0.01  # where a prediction is a simulation
 
@@ -55,20 +57,29 @@ def excess(s: Search, r: Refit) -> tuple[float, float]:
 
 
 def needed(s: Search, larger: Refit, smaller: Refit) -> bool:
-    """Whether the effect by which `larger` exceeds `smaller` has to be there."""
+    """Whether the effect by which `larger` exceeds `smaller` has to be there.
+
+    It must lower the criterion by `GAIN`, and explain a share `NEEDED` of the misfit or turn what is left into noise.
+    A law that differs from ours leaves something too, which another effect may take up in the recordings that are
+    fitted: so an effect of small share has to help with the held-out recordings as well.
+    """
     gained = s.criterion(smaller) - s.criterion(larger)
     if gained < GAIN:
         return False
-    if sum(excess(s, smaller)) - sum(excess(s, larger)) < NEEDED * sum(excess(s, s.empty)):
-        return quality(s, larger).noise and not quality(s, smaller).noise and gained > 3 * GAIN
-    return True
+    share = (sum(excess(s, smaller)) - sum(excess(s, larger))) / max(sum(excess(s, s.empty)), 1e-9)
+    outside = s.outside(smaller) - s.outside(larger)
+    if share < NEEDED:
+        noise = quality(s, larger).noise and not quality(s, smaller).noise
+        return noise and gained > 3 * GAIN and (outside > GAIN / 2 or not larger.n_held)
+    return outside > 0 or share > HELPLESS or not larger.n_held
 
 
 def choose(s: Search) -> Refit:
     """The set of smallest criterion, less every effect that isn't needed."""
     best = min(s.refits.values(), key=s.criterion)
     while best.keys:
-        smaller = [s.refits[frozenset(best.keys) - {k}] for k in best.keys if frozenset(best.keys) - {k} in s.refits]
+        wanted = [s.names(frozenset(best.keys) - {k}) for k in best.keys]
+        smaller = [s.refits[k] for k in best_of_each(s) if s.names(k) in wanted]
         smaller = [r for r in smaller if not needed(s, best, r)]
         if not smaller:
             break

@@ -31,6 +31,8 @@ from tissuejax.recordings.recording import Sample
 
 MEMORIES = ("viscoelasticity", "softening")
 STEP = 1e-6  # of a parameter's scale
+STRESS = 0.05  # of the largest stress: the least scale of a modulus or an offset
+ADDED = ("effects.drift.", "effects.periodic.")  # added to the stress last: their derivative needs nothing else
 
 
 @partial(jax.jit, static_argnums=0)
@@ -106,7 +108,7 @@ class MaterialBench(Bench):
         bench._tests = tests
         bench._of = {n: [s for s in segments if s.recording == n] for n in recordings}
         strain = max(float(np.max(np.abs(np.log(s.drive) if s.drive_name == "stretch" else s.drive))) for s in segments)
-        top = float(np.quantile(np.abs(bench.y), 0.98))
+        top = bench._top = float(np.quantile(np.abs(bench.y), 0.98))
         ends = [float(t.start + np.ptp(t.time)) for t in tests.values()]
         sizes = sizes or Sizes(
             energy=0.5 * top * strain or 1.0,
@@ -138,6 +140,9 @@ class MaterialBench(Bench):
         self.base = tuple(self.free)
         for entry in found:
             free, start, candidates = entry.declare(whole, self.fitted, self.held_out)
+            for path, f in free.items():  # skin and rubber are a thousand times as stiff as what scales are declared for
+                if f.unit == "Pa" and not f.log:
+                    free[path] = replace(f, scale=max(f.scale, STRESS * self._top))
             self.free.update(free)
             self.start.update(start)
             self.candidates.update({c.key: c for c in candidates})
@@ -212,6 +217,12 @@ class MaterialBench(Bench):
                         self._put(out[i], name, known[after] - known[before])
         return out.T
 
+    def burden(self, keys: Sequence[str]) -> int:
+        """See `Bench.burden`: memories run side by side and count once."""
+        paths = [p for key in keys for p in self.candidates[key].paths]
+        heavy = {d for p in paths for prefix, d in self._heavy.items() if p.startswith(prefix)}
+        return len(heavy.difference(MEMORIES)) + bool(heavy.intersection(MEMORIES))
+
     def _step(self, path: str, value: float) -> float:
         f = self.free[path]
         h = STEP * (abs(value) if f.log else max(f.scale, abs(value)))
@@ -223,7 +234,11 @@ class MaterialBench(Bench):
         """See `Bench.jacobian`."""
         at = {**{p: self.start[p] for p in paths}, **values}
         steps = np.array([self._step(p, at[p]) for p in paths])
-        return self._differences([(at, {**at, p: at[p] + h}) for p, h in zip(paths, steps)], recordings) / steps
+        pairs = []
+        for p, h in zip(paths, steps):
+            known = {k: v for k, v in at.items() if k.startswith(ADDED)} if p.startswith(ADDED) else at
+            pairs.append((known, {**known, p: at[p] + h}))
+        return self._differences(pairs, recordings) / steps
 
     def columns(
         self, values: Mapping[str, float], settings: Sequence[tuple[Mapping[str, float], str]]
@@ -231,10 +246,11 @@ class MaterialBench(Bench):
         """See `Bench.columns`. While an effect is neutral its shapes mean nothing: all start from one prediction."""
         pairs, steps = [], []
         for setting, path in settings:
-            at = {path: self.start[path], **values, **setting}
+            known = {k: v for k, v in values.items() if k.startswith(ADDED)} if path.startswith(ADDED) else values
+            at = {path: self.start[path], **known, **setting}
             steps.append(self._step(path, at[path]))
             acting = {k: v for k, v in setting.items() if k in self._amplitudes and v != self.start[k]}
-            pairs.append(({**values, path: at[path], **acting}, {**at, path: at[path] + steps[-1]}))
+            pairs.append(({**known, path: at[path], **acting}, {**at, path: at[path] + steps[-1]}))
         return self._differences(pairs, self.fitted) / np.array(steps)
 
     def settings(self, candidate: Candidate, prediction: Float[np.ndarray, " N"]) -> Sequence[Mapping[str, float]]:

@@ -15,6 +15,8 @@ from scipy.optimize import lsq_linear
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.misfit import Misfit
 
+HOPELESS = 5e-4  # of what exceeds noise: a fit that leaves much is not polished
+NOTHING = 1e-5  # of the largest effect of a parameter, each moved by its scale: what a one-sided difference errs by
 ENOUGH = 2e-3  # of chi-square: where a prediction is a simulation, a step that promises less is not taken
 
 
@@ -131,9 +133,12 @@ class Descent:
             if not np.all(np.isfinite(jac)):
                 return x, cost, prediction, False
             self.last = jac
-            q, t = np.linalg.qr(jac)
-            right = q.T @ r
             size = np.linalg.norm(jac, axis=0)
+            # A column that is nothing but the error of a difference (a fibre along an axis: no slope in its angle) must
+            # not call for a step of its own, or nothing else moves.
+            nothing = size * self.scale < NOTHING * np.max(size * self.scale, initial=0.0)
+            q, t = np.linalg.qr(np.where(nothing, 0.0, jac))
+            right = q.T @ r
             size = np.maximum(size, 1e-9 * np.max(size, initial=0.0) + 1e-6 / self.scale)
             for _ in range(4 if dear else 10):
                 a = np.vstack([t, np.diag(np.sqrt(damping) * size)])
@@ -162,7 +167,7 @@ class Descent:
                 jac, given = None, False
             cost, x, r, prediction = new, trial, r_new, p_new
             damping = max(damping / 10, 1e-9)
-            small = small + 1 if drop < tolerance else 0
+            small = small + 1 if drop < max(tolerance, HOPELESS * (cost - len(r))) else 0
             if small >= 2 or drop < 1e-3 * tolerance:
                 return x, cost, prediction, True
         return x, cost, prediction, False

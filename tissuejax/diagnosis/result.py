@@ -53,7 +53,7 @@ class Diagnosis:
             "next_experiment": [p.as_dict() for p in self.proposals],
             "located": [x.as_dict() for x in self.located()],
             "candidates": self.candidates(),
-            "sets": self.sets(),
+            "sets": self.sets(1000),
             "before": self.errors(s.empty),
             "after": self.errors(v.chosen),
             "base_parameters": self.base(),
@@ -128,13 +128,14 @@ class Diagnosis:
         return sorted(out, key=lambda c: c["criterion"] if c["criterion"] is not None else math.inf)
 
     def sets(self, most: int = 10) -> list[dict]:
-        """The best sets of effects with what they reach."""
+        """The best sets of effects, each in its best form, with what they reach; the criterion above the best one's."""
         s = self.search
         best = min(s.criterion(r) for r in s.refits.values())
         return [
             {
                 "effects": list(s.refits[k].keys),
                 "criterion": s.criterion(s.refits[k]) - best,
+                "information_criterion": s.refits[k].chi2 + s.inside(s.refits[k]),
                 "chi2_per_sample": s.refits[k].chi2 / s.refits[k].n,
                 "held_out_chi2_per_sample": s.refits[k].held / s.refits[k].n_held if s.refits[k].n_held else None,
             }

@@ -34,6 +34,7 @@ class Budget:
         starts: settings of the shapes tried in a refit.
         iterations: of a refit.
         tolerance: of a refit, in units of chi-square.
+        burden: searches and memories nested in a prediction at most (`Bench.burden`): three take a second a prediction.
     """
 
     most: int = 3
@@ -43,6 +44,7 @@ class Budget:
     starts: int = 2
     iterations: int = 30
     tolerance: float = 0.1
+    burden: int = 2
 
 
 @dataclass
@@ -67,10 +69,14 @@ class Search:
         """The fit of the base model alone."""
         return self.refits[frozenset()]
 
-    def penalty(self, r: Refit) -> float:
-        """What r's parameters cost: Schwarz's, with the number of independent samples."""
-        inside, outside = (max(self.misfit.effective(x), 3.0) for x in (self.bench.fitted, self.bench.held_out))
-        return r.k * math.log(inside) + len(r.own) * math.log(outside)
+    def inside(self, r: Refit) -> float:
+        """What r's parameters cost: Schwarz's k log n, n the number of independent samples that were fitted."""
+        return r.k * math.log(max(self.misfit.effective(self.bench.fitted), 3.0))
+
+    def outside(self, r: Refit) -> float:
+        """Surprise of the held-out recordings, and the price of what they have for themselves."""
+        held = r.held if self.bench.dear else surprise(r.held, r.n_held)
+        return held + len(r.own) * math.log(max(self.misfit.effective(self.bench.held_out), 3.0))
 
     def criterion(self, r: Refit) -> float:
         """Surprise of the fitted recordings + penalty + surprise of the held-out ones: the smaller the better.
@@ -78,9 +84,8 @@ class Search:
         The first two are Schwarz's criterion; the third is minus twice the log predictive density of recordings that
         took no part in the fit, up to a constant, so the sum is one evidence-like number.
         """
-        if self.bench.dear:
-            return r.chi2 + self.penalty(r) + r.held
-        return surprise(r.chi2, r.n) + self.penalty(r) + surprise(r.held, r.n_held)
+        fitted = r.chi2 if self.bench.dear else surprise(r.chi2, r.n)
+        return fitted + self.inside(r) + self.outside(r)
 
     def names(self, keys: frozenset) -> frozenset:
         """Effects in a set, whatever their form."""
@@ -106,6 +111,8 @@ class Search:
         for s in sorted(self.score(keys), key=lambda s: -worth.get(s.key, -math.inf)):
             name = self.bench.candidates[s.key].name
             if worth.get(s.key, -1.0) <= 0 or (name not in count and len(count) >= most):
+                continue
+            if self.bench.burden((*keys, s.key)) > self.budget.burden:
                 continue
             if count.get(name, 0) >= (1 if keys and not self.bench.dear else 2):  # the other forms are tried beside it
                 continue
@@ -161,7 +168,7 @@ class Search:
             at = best
 
     def leave_out(self) -> None:
-        """Refit the best set without each of its effects in turn, and go on from the best of these if it is better."""
+        """Refit the best set without each of its effects in turn, in all forms; go on from the best of these."""
         at = None
         while at != (at := frozenset(min(self.refits.values(), key=self.criterion).keys)):
             parent = self.refits[at]
@@ -171,6 +178,7 @@ class Search:
                     order = tuple(k for k in parent.keys if k != key)
                     self.report(" + ".join(order))
                     self.refits[smaller] = self.best(order, [parent.values])
+                self.reshape(smaller)
 
     def best(self, keys: tuple[str, ...], starts: list[Mapping[str, float]]) -> Refit:
         """The best of several starts, each given a few iterations before the winner is finished."""
@@ -241,7 +249,7 @@ def search(bench: Bench, budget: Budget | None = None, report: Callable[[str], N
             break
         if size == 0 and not bench.dear:
             renew_noise(s)
-        for keys in best_of_each(s)[: 1 if bench.dear else 4]:
+        for keys in best_of_each(s)[: 1 if bench.dear else (4, 2, 1)[min(size, 2)]]:
             s.reshape(keys)
         best = min(s.refits.values(), key=s.criterion)
         if len(best.keys) <= size or quality(s, best).noise:

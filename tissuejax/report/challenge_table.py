@@ -1,4 +1,4 @@
-"""Pictures of a graded challenge: the confusion matrix, and how often it is right against the size of the effect."""
+"""Pictures of a graded challenge: confusion, how often it is right by size of the effect and by stated confidence."""
 
 import os
 from pathlib import Path
@@ -15,11 +15,14 @@ TRUTHS = ("nothing", "outside the catalogue")
 
 
 def figures(graded: dict, out: str | os.PathLike) -> dict[str, Path]:
-    """Draw both pictures of the content of graded.json into a folder; returns their paths."""
+    """Draw the pictures of the content of graded.json into a folder; returns their paths."""
     out = Path(out)
     return {
         "confusion": write_figure(out / "confusion.png", confusion_figure(graded["confusion"]), dpi=100),
         "by_size": write_figure(out / "by_size.png", size_figure(graded["by_size"]), dpi=100),
+        "calibration": write_figure(
+            out / "calibration.png", calibration_figure(graded["calibration"]["bins"]), dpi=100
+        ),
     }
 
 
@@ -73,4 +76,24 @@ def size_figure(by_size: list[dict]) -> Figure:
     ax.set_xlabel("rms of the effect beyond a refitted base, over the noise")
     ax.set_ylabel("share of cases")
     ax.legend(fontsize=8, frameon=False)
+    return figure
+
+
+def calibration_figure(bins: list[dict]) -> Figure:
+    """How often answers were right against the confidence they stated, with 95 % intervals and the number of cases."""
+    figure = Figure(figsize=(4.2, 3.8), layout="constrained", facecolor=PAPER)
+    ax = figure.subplots()
+    tidy(ax)
+    ax.plot([0, 1], [0, 1], color=INK, lw=0.8, ls=":")
+    x, y = (np.array([b[k] for b in bins]) for k in ("stated", "share"))
+    reach = [y - np.array([b["low"] for b in bins]), np.array([b["high"] for b in bins]) - y]
+    ax.errorbar(x, y, np.maximum(reach, 0), marker="o", ms=5, lw=0, elinewidth=1, color=SERIES[0])
+    for b in bins:
+        ax.annotate(
+            f"{b['of']}", (b["stated"], b["share"]), (4, -11), textcoords="offset points", fontsize=8, color=INK
+        )
+    ax.set_xlim(0, 1.03)
+    ax.set_ylim(0, 1.03)
+    ax.set_xlabel("stated confidence (mean of the bin)")
+    ax.set_ylabel("share of answers that were right")
     return figure
