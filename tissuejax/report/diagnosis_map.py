@@ -1,84 +1,90 @@
-"""The stiffness map on the mesh: where each recording wants the tissue stiffer (blue) or softer (orange)."""
+"""Where on the mesh the data want the tissue stiffer or softer: the base model's misfit, element by element."""
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from matplotlib.collections import PolyCollection
-from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from tissuejax.diagnosis.result import Diagnosis
-from tissuejax.report.plot import HELD, INK, MODEL, PAPER, Plot, grid
+from tissuejax.diagnosis.stiffness_map import StiffnessMap
+from tissuejax.report.plot import INK, Plot, grid
 
-SIGNED = LinearSegmentedColormap.from_list("softer-stiffer", [HELD, PAPER, MODEL])
+MOST = 3  # recordings shown, the strongest maps
+
+
+@dataclass(frozen=True)
+class Views:
+    """One map as seen from above and from the side, mm: per column of elements the strongest density."""
+
+    recording: str
+    above: tuple[np.ndarray, np.ndarray, np.ndarray]
+    side: tuple[np.ndarray, np.ndarray, np.ndarray]
+    size: float
+    one_sided: float
+    sign: int
+    centre: np.ndarray
+
+
+def strongest(a: np.ndarray, b: np.ndarray, density: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of all elements that lie behind each other at (a, b), the density of largest size."""
+    step = 1e-3 * max(float(np.ptp(a)), float(np.ptp(b)), 1e-12)
+    places = np.round(np.column_stack([a, b]) / step).astype(int)
+    order = np.argsort(-np.abs(density), kind="stable")
+    _, first = np.unique(places[order], axis=0, return_index=True)
+    keep = order[first]
+    keep = keep[np.argsort(np.abs(density[keep]))]  # the strongest are drawn last
+    return 1e3 * a[keep], 1e3 * b[keep], density[keep]
 
 
 class DiagnosisMap(Plot):
-    """Seen from above (summed over depth) and in a section through the centre of the region."""
+    """From above and from the side; red wants stiffer, blue softer."""
 
     name: ClassVar[str] = "stiffness-map"
     subject: ClassVar[type] = Diagnosis
-    order: ClassVar[int] = 25
+    order: ClassVar[int] = 26
 
-    def prepare(self, subject: Diagnosis) -> list[dict] | None:
-        """For each map of hexes: outlines in mm with values scaled to 1, from above and in section; the region."""
-        maps = [m for m in subject.maps if m.cells.shape[1] == 8 and np.any(m.gain)]
-        if not maps:
-            return None
-        out = []
-        for m in maps:
-            corners = 1e3 * m.points[m.cells]
-            key = np.round(corners[:, :4, :2].mean(1), 6)
-            _, first, column = np.unique(key, axis=0, return_index=True, return_inverse=True)
-            outline = corners[first][:, [4, 5, 6, 7], :2]
-            area = 0.5 * np.abs(
-                (outline[:, 2] - outline[:, 0])[:, 0] * (outline[:, 3] - outline[:, 1])[:, 1]
-                - (outline[:, 2] - outline[:, 0])[:, 1] * (outline[:, 3] - outline[:, 1])[:, 0]
-            )
-            above = np.bincount(column.ravel(), m.gain, len(first)) / area
-            centre = 1e3 * m.centre
-            cut = (corners[:, :, 1].min(1) <= centre[1]) & (corners[:, :, 1].max(1) > centre[1])
-            section = corners[cut][:, [0, 1, 5, 4]][:, :, [0, 2]]
-            out.append(
-                {
-                    "recording": m.recording,
-                    "above": (outline, above / np.abs(above).max()),
-                    "section": (section, m.density[cut] / max(np.abs(m.density[cut]).max(), 1e-300)),
-                    "centre": centre,
-                    "size": 1e3 * m.size,
-                    "one_sided": m.one_sided,
-                }
-            )
-        return out
+    def prepare(self, subject: Diagnosis) -> list[Views] | None:
+        """Views of the strongest maps; None where no map was made."""
+        maps = sorted(subject.maps, key=lambda m: -float(np.abs(m.gain).sum()))[:MOST]
+        return [self._views(m) for m in maps] or None
 
-    def caption(self, data: list[dict]) -> str:
-        """What the colours mean and how far to trust them."""
-        return (
-            "Derivative of the base model's misfit by the stiffness of every element: blue where the recording wants "
-            "the tissue stiffer, orange softer; left from above, right in the section through the centre (cross; the "
-            "circle is its root mean square extent). A place that probe and markers can't feel stays white."
+    @staticmethod
+    def _views(m: StiffnessMap) -> Views:
+        x, y, z = m.centres.T
+        return Views(
+            m.recording,
+            strongest(x, y, m.density),
+            strongest(x, z, m.density),
+            float(np.abs(m.density).max()),
+            m.one_sided,
+            m.sign,
+            1e3 * m.centre,
         )
 
-    def draw(self, data: list[dict]) -> Figure:
-        """Two panels a recording."""
-        figure, axes = grid(2 * len(data), columns=2, width=9.0, height=3.0)
-        for i, one in enumerate(data):
-            for ax, cut, (a, b) in zip(axes[2 * i : 2 * i + 2], ("above", "section"), ((0, 1), (0, 2)), strict=True):
-                outline, value = one[cut]
-                ax.add_collection(
-                    PolyCollection(outline, array=value, cmap=SIGNED, clim=(-1, 1), edgecolor="#d8dee4", linewidth=0.3)
-                )
-                ax.plot(*one["centre"][[a, b]], "+", color=INK)
-                t = np.linspace(0, 2 * np.pi, 100)
-                ax.plot(
-                    one["centre"][a] + one["size"] * np.cos(t),
-                    one["centre"][b] + one["size"] * np.sin(t),
-                    color=INK,
-                    linewidth=0.6,
-                )
-                ax.set_aspect("equal")
-                ax.autoscale_view()
-                ax.set_xlabel("x (mm)")
-                ax.set_ylabel("yz"[b - 1] + " (mm)")
-                ax.set_title(f"{one['recording']}, {cut}")
+    def caption(self, data: list[Views]) -> str:
+        """What the strongest map says."""
+        m = data[0]
+        word = "stiffer" if m.sign > 0 else "softer"
+        x, y, z = m.centre
+        return (
+            "How fast the misfit of the base model falls as each element becomes stiffer (red) or softer (blue), "
+            f"per volume; of elements behind each other the strongest. {m.recording} wants the tissue {word} "
+            f"in the main ({m.one_sided:.0%} of its map), about x {x:.1f}, y {y:.1f}, z {z:.1f} mm. A map locates; "
+            "what it is, contrast and extent, comes from the refit, and a place that nothing can feel stays white. "
+            "Depth is its weak coordinate."
+        )
+
+    def draw(self, data: list[Views]) -> Figure:
+        """Two rows: from above, from the side."""
+        n = len(data)
+        figure, axes = grid(2 * n, columns=n, width=max(4.2 * n, 5.0), height=2.9)
+        for i, m in enumerate(data):
+            for ax, view, names in ((axes[i], m.above, "xy"), (axes[i + n], m.side, "xz")):
+                a, b, density = view
+                shown = dict(cmap="RdBu_r", vmin=-m.size, vmax=m.size, s=14, marker="s", linewidths=0)
+                ax.scatter(a, b, c=density, **shown)
+                ax.plot(m.centre[0], m.centre[1 if names == "xy" else 2], "+", color=INK, markersize=9)
+                ax.set(aspect="equal", xlabel="x (mm)", ylabel=f"{names[1]} (mm)")
+                ax.set_title(f"{m.recording}, {'from above' if names == 'xy' else 'from the side'}", loc="left")
         return figure

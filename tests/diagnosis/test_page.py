@@ -1,0 +1,131 @@
+"""The page of a diagnosis and its figures, as data, on benches in closed form; drawing is only checked to happen."""
+
+import re
+
+import numpy as np
+import pytest
+from spring_bench import spring
+
+from tissuejax.diagnosis.bench import Segment
+from tissuejax.diagnosis.decide import decide
+from tissuejax.diagnosis.result import Diagnosis
+from tissuejax.diagnosis.search import Budget, search
+from tissuejax.diagnosis.specimens import Specimens, brief
+from tissuejax.diagnosis.stiffness_map import StiffnessMap
+from tissuejax.report import diagnosis_sentences as sentences
+from tissuejax.report.diagnosis_map import DiagnosisMap, strongest
+from tissuejax.report.diagnosis_markers import DiagnosisMarkers
+from tissuejax.report.diagnosis_page import write_diagnosis
+from tissuejax.report.diagnosis_remainder import DiagnosisRemainder
+from tissuejax.report.diagnosis_specimens import DiagnosisSpecimens
+
+
+def diagnosed(bench, **more):
+    found = search(bench)
+    return Diagnosis("spring", "cubic", found, decide(found), 1.0, **more)
+
+
+@pytest.fixture(scope="module")
+def relaxing():
+    return diagnosed(spring({"relax.g": 0.2, "relax.tau": 0.6}))
+
+
+@pytest.fixture(scope="module")
+def stepping():
+    """Something that no candidate explains."""
+    bench = spring({})
+    for s in bench.segments:
+        bench.y[s.rows] += {"r1": 1.0, "r2": -0.6, "r3": 1.4}[s.recording] * (s.time > 9.0)
+    return diagnosed(bench)
+
+
+def test_the_page_tells_the_story_in_its_order(relaxing, tmp_path):
+    page = write_diagnosis(relaxing, tmp_path)["page"].read_text()
+    assert not re.search(r'(src|href)="(?!data:)', page), "the page points outside itself"
+    told = [t.replace("&#39;", "'") for t in re.findall(r"<h2>(.*?)</h2>", page)]
+    assert told == [
+        "What the residual looks like, before and after",
+        "Where the base model misses",
+        "The physics that was missing",
+        "How sure",
+        "What this can't tell",
+        "Before and after, in numbers",
+        "What to measure next",
+        "What is still missing",
+        "What was tried",
+    ]
+    assert "Missing: relax" in page
+    assert page.count("data:image/png;base64,") >= 4
+
+
+def test_sentences_say_how_sure_and_against_what(relaxing):
+    lines = " ".join(sentences.sure(relaxing))
+    assert "what is left is noise" in lines
+    assert "best other explanation" in lines
+    assert "second specimen" in sentences.next_steps(relaxing)[0]
+
+
+def test_what_is_unexplained_sends_the_reader_to_the_remainder(stepping):
+    assert stepping.verdict.kind == "unexplained"
+    assert "remainder" in sentences.next_steps(stepping)[0]
+    plot = DiagnosisRemainder()
+    data = plot.prepare(stepping)
+    assert data[0].share["time"] > data[0].share["drive"]
+    assert "a function of time" in plot.caption(data)
+    assert plot.draw(data) is not None
+
+
+def test_noise_has_no_picture_of_a_remainder(relaxing):
+    assert DiagnosisRemainder().prepare(relaxing) is None
+
+
+def test_markers_and_maps_are_shown_where_there_are_some(relaxing, rng):
+    assert DiagnosisMarkers().prepare(relaxing) is None
+    assert DiagnosisMap().prepare(relaxing) is None
+    bench, n, t = spring({}), 40, np.arange(40.0)
+    depth = np.interp(t, [0, 20, 39], [0, 5e-3, 5e-3])
+    places = [(x, y, 0.0) for x in (0.0, 0.01, 0.02) for y in (0.0, 0.01)]
+    bench.segments, rows, missed = [], [], []
+    for j, place in enumerate(places):
+        for a, rest in zip("xyz", place, strict=True):
+            at = slice(len(rows) * n, (len(rows) + 1) * n)
+            bench.segments.append(Segment("r1", "markers", f"marker {j} {a}", at, t, "m", depth, "depth", "m"))
+            rows.append(rest + 1e-5 * rng.standard_normal(n))
+            missed.append(5e-4 * (j == 4 and a == "x") * depth / 5e-3)
+    bench.y, bench.sigma = np.concatenate(rows), np.full(n * len(rows), 1e-5)
+    bench.fitted, bench.held_out = ("r1",), ()
+    bench.predict = lambda values, recordings=None: bench.y - np.concatenate(missed)
+    bench.jacobian = lambda values, paths, recordings=None: np.zeros((len(bench.y), len(paths)))
+    centres = np.array([[x, y, z] for x, y, _ in places for z in (0.001, 0.003)])
+    gain = np.where(np.arange(12) == 9, 5.0, 0.1)
+    found = search(bench, Budget(most=0))
+    maps = [StiffnessMap("r1", centres, np.zeros((0, 8), int), centres, gain, gain)]
+    d = Diagnosis("probe", "cubic", found, decide(found), 1.0, maps=maps)
+    seen = DiagnosisMarkers().prepare(d)
+    assert int(np.argmax(seen[0].chi_before)) == 4
+    assert "marker 4 in r1" in DiagnosisMarkers().caption(seen)
+    views = DiagnosisMap().prepare(d)
+    assert len(views[0].above[0]) == 6  # elements behind each other count once
+    assert views[0].above[2].max() == 5.0
+    assert "stiffer" in DiagnosisMap().caption(views)
+    for plot, data in ((DiagnosisMarkers(), seen), (DiagnosisMap(), views)):
+        assert plot.draw(data) is not None
+
+
+def test_of_what_lies_behind_the_strongest_counts():
+    a, b, c = strongest(np.array([0.0, 0.0, 1.0]), np.zeros(3), np.array([1.0, -2.0, 0.5]))
+    assert sorted(zip(a.tolist(), c.tolist(), strict=True)) == [(0.0, -2.0), (1000.0, 0.5)]
+
+
+def test_many_specimens_are_counted(relaxing, stepping):
+    many = Specimens({"a": brief(relaxing), "b": brief(stepping), "c": brief(relaxing)})
+    assert many.verdicts == {"found": 2, "unexplained": 1}
+    assert many.counts == {"relax": 2}
+    assert many.first() == {"relax": 2}
+    assert many.told().startswith("a: found, relax; b: unexplained, ")
+    assert many.records["a"]["rmse_over_peak"]["after"]["held_out"] < 0.01
+    plot = DiagnosisSpecimens()
+    data = plot.prepare(many)
+    assert "relax in 2 of 3" in plot.caption(data)
+    assert np.isnan(data["rank"][1]).all()
+    assert plot.draw(data) is not None
