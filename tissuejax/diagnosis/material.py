@@ -140,7 +140,8 @@ class MaterialBench(Bench):
         self.base = tuple(self.free)
         for entry in found:
             free, start, candidates = entry.declare(whole, self.fitted, self.held_out)
-            for path, f in free.items():  # skin and rubber are a thousand times as stiff as what scales are declared for
+            # skin and rubber are a thousand times as stiff as what the scales are declared for
+            for path, f in free.items():
                 if f.unit == "Pa" and not f.log:
                     free[path] = replace(f, scale=max(f.scale, STRESS * self._top))
             self.free.update(free)
