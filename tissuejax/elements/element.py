@@ -39,6 +39,11 @@ class Element(eqx.Module):
         """Nodes of one element."""
         return len(self.corners)
 
+    @property
+    def general(self) -> "Element":
+        """The same element without a short cut that holds for some shapes only."""
+        return self
+
     @abc.abstractmethod
     def shape(self, xi: Float[Array, "q 3"]) -> Float[Array, "q k"]:
         """Shape functions at reference points: 1 at their own node, 0 at the others, sum 1."""

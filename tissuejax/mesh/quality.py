@@ -60,12 +60,17 @@ def corner_jacobians(points: Float[np.ndarray, "N 3"], cells: Int[np.ndarray, "E
 
 
 def cell_volumes(points: Float[np.ndarray, "N 3"], cells: Int[np.ndarray, "E k"], cell_type: str):
-    """Volume of each cell, m^3: exact for tets, one-point (which is what the solver integrates) for hexes."""
+    """Volume of each cell, m^3, exact: a trilinear hex by 2 x 2 x 2 Gauss points."""
     x = np.asarray(points)[cells]
     if cell_type == "tetra":
         return np.linalg.det(x[:, 1:] - x[:, :1]) / 6
     signs = np.array([[-1, 1, 1, -1, -1, 1, 1, -1], [-1, -1, 1, 1, -1, -1, 1, 1], [-1, -1, -1, -1, 1, 1, 1, 1]])
-    return np.linalg.det(np.einsum("ja,eai->eji", signs, x) / 8) * 8
+    total = 0.0
+    for place in signs.T / np.sqrt(3):
+        one = 1 + place[:, None] * signs
+        slopes = signs * np.stack([one[1] * one[2], one[0] * one[2], one[0] * one[1]]) / 8
+        total = total + np.linalg.det(np.einsum("ja,eai->eji", slopes, x))
+    return total
 
 
 def quality(geometry: Geometry) -> Quality:

@@ -1,8 +1,8 @@
 """From a mesh, a material and a probe path to a `Scene`: the choices that are made once, on the host.
 
 Step: `SAFETY` times the critical step at the given parameters (give the stiffest ones that a fit may visit). Penalty:
-`GRIP` times the wave modulus over the facet size, which keeps penetration near a thousandth of the probe's radius.
-Patch: facets that the probe can come near. What can't work is refused here, once, with a sentence.
+see `automatic_penalty`. Patch: facets that the probe can come near. What can't work is refused here, once, with a
+sentence.
 """
 
 import math
@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from tissuejax import elements
+from tissuejax.elements.hex8 import Hex8, straight
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.volumetric import Volumetric
 from tissuejax.errors import InputError
@@ -23,10 +24,11 @@ from tissuejax.recordings.recording import Geometry
 from tissuejax.tled.contact import quadrature
 from tissuejax.tled.scene import Body, Clock, Markers, Probe, Scene, Settings, Support, Tissue
 from tissuejax.tled.shapes import Hemisphere, Platen, Shape, Sphere
-from tissuejax.tled.stable import critical_steps, wave_modulus
+from tissuejax.tled.stable import critical_steps
 
 SAFETY = 0.7
-GRIP = 40.0
+YIELD = 500.0  # a pressure of one shear modulus pushes the surface into the probe by at most its radius over this
+ONSET = 0.1  # softness of contact over that penetration
 PATCH = 16  # patches are padded to a multiple of this, so that scenes of one mesh share a program
 
 
@@ -75,7 +77,7 @@ def scene(
         probe_time, probe_position, radius or shape: the probe; None for none.
         compression: factor f by which slow motion is run faster.
         step: s on the simulated clock; None is `SAFETY` times the critical one.
-        penalty: Pa/m; None is automatic. softness: m; None is a thousandth of the radius.
+        penalty: Pa/m; None is automatic. softness: m; None is a tenth of the penetration (`automatic_penalty`).
         hourglass: in units of the shear modulus (0.1 to 0.5).
         mass_damping: 1/s; None is half the lowest shear frequency pi/2 c_s / height.
         stiffness_damping: beta, s; 5e-5 s for forward tangents of slow runs.
@@ -95,7 +97,7 @@ def scene(
     body = Body(
         jnp.asarray(geometry.points), jnp.asarray(geometry.cells, jnp.int32), jnp.asarray(geometry.fixed, jnp.int32),
         jnp.ones((len(geometry.fixed), 3)) if held is None else jnp.asarray(held, float),
-        jnp.asarray(facets.nodes, jnp.int32), element(geometry.cell_type),
+        jnp.asarray(facets.nodes, jnp.int32), _element(geometry),
     )  # fmt: skip
     tissue = Tissue(energy, volumetric, _floats(energy_values), _floats(volumetric_values), jnp.asarray(float(density)))
     if mass_damping is None:
@@ -135,12 +137,10 @@ def probe(bare: Scene, shape: Shape, time, position, facets, penalty=None, softn
     """The probe over its contact patch, with penalty, softness and the static mass of the patch chosen."""
     time, position = np.asarray(time, float), np.asarray(position, float)
     points = np.asarray(bare.body.points)
-    size = math.sqrt(np.linalg.norm(area_vectors(points, facets), axis=1).mean())
     if penalty is None:
-        penalty = GRIP * float(wave_modulus(bare)) / size
+        penalty = automatic_penalty(bare, shape, facets)
     if softness is None:
-        reach = float(shape.reach())
-        softness = 1e-3 * (reach if math.isfinite(reach) else size)
+        softness = ONSET * _shear_modulus(bare) / penalty
     area = _areas(points, facets)
     weights, _ = quadrature(facets.shape[1])
     nodal = np.zeros(len(points))
@@ -155,6 +155,32 @@ def probe(bare: Scene, shape: Shape, time, position, facets, penalty=None, softn
     )  # fmt: skip
     _refuse_inside(made, points, float(bare.clock.start))
     return made
+
+
+def automatic_penalty(bare: Scene, shape: Shape, facets) -> float:
+    """Pressure per penetration, Pa/m: mu / min(h^2 / (4 R), R / YIELD), mu the shear modulus, h the finest facets.
+
+    The pressure under a probe is of the order of mu. A facet of size h is flat where the probe, of radius R, curves by
+    h^2 / (4 R) from its corners to its middle. A penalty that allows less penetration than that holds nine points of a
+    flat facet off a round probe, and the force comes out too high; one that allows more than some thousandths of R
+    makes it too low. So penetration is the sag of the facets on fine meshes, where both errors fall with h^2, and a
+    500th of R on coarse ones. A flat platen has no sag: a 500th of the facet size.
+    """
+    shear, points, reach = _shear_modulus(bare), np.asarray(bare.body.points), float(shape.reach())
+    if not shear > 0:
+        raise InputError(f"shear modulus at rest {shear:.4g} Pa: no penalty follows from it; give `penalty` in Pa/m")
+    size = math.sqrt(np.quantile(np.linalg.norm(area_vectors(points, facets), axis=1), 0.1))
+    allowed = min(size**2 / (4 * reach), reach / YIELD) if math.isfinite(reach) else size / YIELD
+    return shear / allowed
+
+
+def _shear_modulus(bare: Scene) -> float:
+    return float(bare.tissue.energy.initial_shear_modulus(bare.tissue.energy_values))
+
+
+def _element(geometry: Geometry):
+    made = element(geometry.cell_type)
+    return Hex8(straight(geometry.points, geometry.cells)) if isinstance(made, Hex8) else made
 
 
 def _floats(values: Mapping[str, float]) -> dict[str, Array]:
@@ -224,7 +250,8 @@ def _refuse_inside(made: Probe, points, start):
     weights, _ = quadrature(made.patch.shape[1])
     x = np.einsum("qv,pvi->qpi", weights, points[np.asarray(made.patch)])
     deep = -_distance(made.shape, x - position).min()
-    if deep > 20 * float(made.softness):
+    reach = float(made.shape.reach())
+    if deep > max(20 * float(made.softness), 0.02 * reach if math.isfinite(reach) else 0.0):
         raise InputError(
             f"the probe starts {1e3 * deep:.2f} mm inside the tissue at t = {start:.4g} s; start the path out of "
             "contact, or check mesh, offset and units"

@@ -17,6 +17,7 @@ from jaxtyping import Array, Float, Int
 from tissuejax.tled.internal import barrier
 from tissuejax.tled.scene import Probe, Scene
 
+BONDED = 4.0  # a point that comes as near as zero gap is bonded by 98 %, however lightly it is pressed
 BREAK = 5.0  # gap over reach at which a bond is gone: exp(1 - 5) * 5 = 9 % of the greatest pull
 
 
@@ -90,7 +91,7 @@ def forces(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Arr
     pressure = probe.penalty * probe.softness * _softplus(-gap / probe.softness)
     push, bond = pressure, grip.bond
     if probe.adhesion is not None:
-        touched = jax.nn.sigmoid(-gap / probe.softness)
+        touched = jax.nn.sigmoid(BONDED - gap / probe.softness)
         bond = jnp.where(gap > BREAK * probe.reach, 0.0, jnp.maximum(bond, touched))
         opening = jnp.maximum(gap, 0.0) / probe.reach
         push = pressure - probe.adhesion * bond * opening * jnp.exp(1.0 - opening)

@@ -45,7 +45,7 @@ def stress_free(scene: Scene, rounds: int = 12, tolerance: float = 1e-8) -> Stre
     """
     if scene.gravity is None:
         raise InputError("a stress-free shape needs gravity: set scene.gravity, for example (0, 0, -9.81) m/s^2")
-    scene = scene.cast(scene.body.points.dtype)
+    scene = scene.put({"body.element": scene.body.element.general}).cast(scene.body.points.dtype)
     measured = scene.body.points
     frozen = jax.lax.stop_gradient(scene)
 

@@ -38,7 +38,7 @@ class Checks(NamedTuple):
         kinetic, internal: energies, J (kinetic with the static mass of contact; internal: elastic, no memory).
         hourglass: energy of the hourglass control, J; more than some per cent of `internal`: too coarse.
         depth: greatest penetration into the probe, m.
-        failed: True where a value is not finite or an element is inverted; `element`: the worst one.
+        failed: True where a value is not finite or an element is inverted; `element`: the worst of the finite ones.
     """
 
     kinetic: Float[Array, " b"]
@@ -47,6 +47,14 @@ class Checks(NamedTuple):
     depth: Float[Array, " b"]
     failed: Array
     element: Int[Array, " b"]
+
+
+class Pace(NamedTuple):
+    """Taken at the end of each frame: whether every speed is finite, and the node that moves fastest. A run that blows
+    up is full of NaN by the next look, so where it began is read off from the last frame that was still finite."""
+
+    finite: Array
+    node: Int[Array, ""]
 
 
 class Outcome(eqx.Module):
@@ -59,7 +67,8 @@ class Outcome(eqx.Module):
         markers: positions, m, (n, K, 3), or None.
         work: done by the probe on the tissue since the start, J.
         checks: energies, penetration and failure at the end of each block; `check_time` says when.
-        failed: -1, or the frame by whose end the run had failed; `element`: where.
+        failed: -1, or the frame by whose end the run had failed; `element`: where (inverted, or at the node that moved
+            fastest when all was last finite).
         state: the final state, to go on from.
     """
 
@@ -110,7 +119,7 @@ def proceed(m: Machine, state: State) -> Outcome:
         zero = jnp.zeros(3, state.u.dtype)
         (state, total), _ = jax.lax.scan(one, (state, Felt(zero, zero, zero, zero[0])), drive, length=clock.steps)
         mean = Felt(*(x / clock.steps for x in total[:3]), total.work)
-        return state, (mean, _markers(scene, state.u))
+        return state, (mean, _markers(scene, state.u), _pace(state))
 
     def block(state, drive):
         state, out = jax.lax.scan(frame, state, drive, length=length)
@@ -121,12 +130,12 @@ def proceed(m: Machine, state: State) -> Outcome:
         block = jax.checkpoint(block, prevent_cse=False)
     drive = jax.tree.map(lambda x: x.reshape(blocks, length, clock.steps, 3), drives(scene, blocks * length))
     if clock.needed is None:
-        state, ((felt, markers), checks) = jax.lax.scan(block, state, drive, length=blocks)
+        state, (series, checks) = jax.lax.scan(block, state, drive, length=blocks)
     else:
         numbered = (jnp.arange(blocks), drive)
-        state, ((felt, markers), checks) = jax.lax.scan(_while_needed(block, length, clock.needed), state, numbered)
-    felt, markers = jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:])[: clock.frames], (felt, markers))
-    return _outcome(scene, felt, markers, checks, length, state)
+        state, (series, checks) = jax.lax.scan(_while_needed(block, length, clock.needed), state, numbered)
+    felt, markers, pace = jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:])[: clock.frames], series)
+    return _outcome(scene, felt, markers, pace, checks, length, state)
 
 
 def _while_needed(block, length: int, needed: Int[Array, ""]):
@@ -184,12 +193,18 @@ def _markers(scene, u):
     return markers.rest + jnp.einsum("kv,ikv->ki", markers.weights, u[:, markers.nodes])
 
 
+def _pace(state: State) -> Pace:
+    v = jax.lax.stop_gradient(state.v)
+    square = jnp.sum(v * v, 0)
+    return Pace(jnp.isfinite(jnp.sum(square)), jnp.argmax(square))
+
+
 def _checks(m: Machine, state: State, centre) -> Checks:
     u, v = jax.lax.stop_gradient((state.u, state.v))
     frozen = jax.lax.stop_gradient(m)
     energy, J, hourglass = internal.internal_energy(frozen.scene, frozen.mesh, u)
     kinetic = 0.5 * jnp.sum(frozen.mass * v * v)
-    J = jnp.where(jnp.isfinite(J), J, -jnp.inf)[: len(frozen.scene.body.cells)]
+    J = jnp.where(jnp.isfinite(J), J, jnp.inf)[: len(frozen.scene.body.cells)]
     worst = jnp.argmin(J)
     failed = (J[worst] <= 0) | ~jnp.isfinite(jnp.sum(v))
     deep = jnp.asarray(-jnp.inf, u.dtype)
@@ -198,17 +213,22 @@ def _checks(m: Machine, state: State, centre) -> Checks:
     return Checks(kinetic, energy, hourglass, deep, failed, worst)
 
 
-def _outcome(scene, felt, markers, checks, length, state) -> Outcome:
+def _outcome(scene, felt, markers, pace, checks, length, state) -> Outcome:
     clock = scene.clock
-    bad = jnp.any(checks.failed)
     first = jnp.argmax(checks.failed)
-    frame = jnp.where(bad, jnp.minimum((first + 1) * length, clock.frames) - 1, -1)
+    looked = jnp.minimum((first + 1) * length, clock.frames) - 1
+    lost = jnp.where(jnp.all(pace.finite), clock.frames, jnp.argmin(pace.finite))  # the first frame that is not finite
+    burst = lost <= looked
+    node = pace.node[jnp.maximum(lost - 1, 0)]
+    near = jnp.argmax(jnp.any(scene.body.cells == node, 1))
+    bad = jnp.any(checks.failed)
+    frame = jnp.where(bad, jnp.where(burst, lost, looked), -1)
     ends = jnp.minimum((jnp.arange(len(checks.failed)) + 1) * length, clock.frames)
     middles = clock.middles - 0.5 * clock.interval / clock.steps  # forces belong to the start of each step
     return Outcome(
         time=middles, end_time=clock.ends, force=felt.force, torque=felt.torque, reaction=felt.reaction,
         work=jnp.cumsum(felt.work), markers=markers, checks=checks, check_time=clock.start + clock.interval * ends,
-        failed=frame, element=jnp.where(bad, checks.element[first], -1), state=state,
+        failed=frame, element=jnp.where(bad, jnp.where(burst, near, checks.element[first]), -1), state=state,
     )  # fmt: skip
 
 

@@ -187,8 +187,10 @@ def checked(found: Equilibrium) -> Equilibrium:
         NotConverged: the residual did not fall below the tolerance.
     """
     if not bool(jnp.isfinite(found.displacement).all()):
+        residual = float(found.residual)
+        how = f"unbalanced force {residual:.1e} of the greatest" if 0 <= residual < jnp.inf else "it burst"
         raise NotConverged(
-            f"no static equilibrium after {int(found.iterations)} iterations: unbalanced force "
-            f"{float(found.residual):.1e} of the greatest; check loads and support, use double precision, or allow more"
+            f"no static equilibrium after {int(found.iterations)} iterations: {how}; check loads and support, use "
+            "double precision, allow more iterations, a larger margin, or come nearer in smaller steps"
         )
     return found

@@ -1,0 +1,145 @@
+"""Optional physics that is switched on, each against a closed form: adhesion, platens, capsule, bedding, gravity."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+from tests.tled import cases
+from tissuejax.energies.reduced_polynomial import ReducedPolynomial
+from tissuejax.energies.volumetric import Quadratic
+from tissuejax.mesh.columns import box
+from tissuejax.recordings.recording import Geometry
+from tissuejax.tled import build, capsule, contact, statics, support
+from tissuejax.tled.shapes import Platen
+from tissuejax.tled.simulate import run
+
+SIZE = (0.02, 0.016, 0.012)
+AREA = SIZE[0] * SIZE[1]
+
+
+def block(counts=(3, 2, 2)):
+    """A box whose base glides: held along z, one corner in plan, a second one against turning; and what is held."""
+    g = box(SIZE, counts)
+    held = np.tile([0.0, 0.0, 1.0], (len(g.fixed), 1))
+    base = np.asarray(g.points)[g.fixed]
+    held[np.linalg.norm(base - base.min(0), axis=1).argmin()] = 1.0
+    held[np.linalg.norm(base - [base[:, 0].max(), base[:, 1].min(), 0], axis=1).argmin(), 1] = 1.0
+    return g, held
+
+
+def under_platen(height, time, counts=(3, 2, 2), **options):
+    """The block under a platen whose face follows `height` over `time`."""
+    g, held = block(counts)
+    path = np.stack([0 * height, 0 * height, height], 1)
+    times = np.linspace(time[0], time[-1], 61)[1:]
+    return build.scene(
+        g, ReducedPolynomial(order=2), Quadratic(), cases.POLY, cases.BULK, 1000.0, times, time, path,
+        shape=Platen(), held=held, **options,
+    )  # fmt: skip
+
+
+def nominal(stretch: float) -> float:
+    """Uniaxial nominal stress with free sides: the energy minimised over the lateral stretch, differentiated, Pa."""
+
+    def energy(x, z):
+        J = x * x * z
+        e = J ** (-2 / 3) * (2 * x * x + z * z) - 3
+        return cases.POLY["C10"] * e + cases.POLY["C20"] * e * e + cases.BULK["K"] / 2 * (J - 1) ** 2
+
+    def least(z):
+        return minimize_scalar(lambda x: energy(x, z), bounds=(0.7, 1.5), method="bounded", options={"xatol": 1e-12})
+
+    return (least(stretch + 1e-5).fun - least(stretch - 1e-5).fun) / 2e-5
+
+
+@pytest.mark.parametrize("stretch", [0.9, 0.75])
+def test_a_platen_compresses_a_gliding_block_homogeneously(stretch):
+    """Force = area x nominal stress at the stretch that is left after the penetration, which follows the softplus."""
+    time = np.array([0.0, 1.0])
+    scene = under_platen(SIZE[2] * np.array([1.0, stretch]) + [1e-4, 0.0], time)
+    found = statics.checked(statics.compiled(scene, 1.0, tolerance=1e-9, margin=3.0))
+    top = np.asarray(scene.body.points)[:, 2] > SIZE[2] - 1e-9
+    down = np.asarray(found.displacement)[top, 2]
+    assert np.ptp(down) < 1e-8
+    reached = 1 + down.mean() / SIZE[2]
+    stress = nominal(reached)
+    assert float(found.force[2]) == pytest.approx(-stress * AREA, rel=1e-6)
+    depth = SIZE[2] * (reached - stretch)
+    softness = float(scene.probe.softness)
+    assert float(scene.probe.penalty) * softness * np.log1p(np.exp(depth / softness)) == pytest.approx(
+        -stress, rel=1e-6
+    )
+    assert depth < 0.01 * (1 - stretch) * SIZE[2]  # the automatic penalty
+
+
+def test_a_sticky_platen_pulls_with_its_strength_and_lets_go():
+    """Pulled apart slowly, the greatest pull is strength x area (at a gap of `reach`), but for the 2 % of a point that
+    was hardly touched; none before the first touch, none once the gap is five times `reach`, none without adhesion."""
+    time = np.array([0.0, 0.3, 0.4, 1.4])
+    height = SIZE[2] + np.array([3e-4, -1e-4, -1e-4, 14e-4])
+    scene = under_platen(height, time, compression=2.0)
+    sticky = scene.put({"probe.adhesion": jnp.asarray(40.0), "probe.reach": jnp.asarray(1.5e-4)})
+    pull, bare = (-np.asarray(run(s).force)[:, 2] for s in (sticky, scene))
+    t = np.asarray(scene.clock.middles)
+    assert pull.max() == pytest.approx(0.98 * 40.0 * AREA, rel=0.02)
+    assert np.abs(pull[t < 0.2]).max() < 1e-3 * 40 * AREA
+    gap = np.interp(t, time, height) - SIZE[2]
+    assert np.abs(pull[(t > 0.4) & (gap > 5 * 1.5e-4 + 1e-4)]).max() < 1e-3 * 40 * AREA
+    assert bare.max() < 0.02 * pull.max()
+
+
+def test_a_capsule_carries_the_tension_of_a_stretched_membrane():
+    """Plane-stress neo-Hookean: c (l1 - l1^-3 l2^-2) per width along 1, on the four faces that a cut across x meets."""
+    g = box(SIZE, (4, 3, 2))
+    scene = cases.plain(g, np.arange(2.0))
+    l1, l2, l3 = 1.2, 0.9, 1.1
+    u = (jnp.asarray(g.points) * jnp.array([l1 - 1, l2 - 1, l3 - 1])).T
+    c = 0.7
+    f = np.asarray(jax.jit(lambda u: capsule.forces(capsule.skin(scene.body), c, u))(u))
+    cut = np.asarray(g.points)[:, 0] > SIZE[0] / 2 - 1e-9
+    along = 2 * SIZE[1] * c * (l1 - l1**-3 * l2**-2) + 2 * SIZE[2] * c * (l1 - l1**-3 * l3**-2)
+    assert f[0, cut].sum() == pytest.approx(along, rel=1e-9)
+    assert np.abs(f.sum(1)).max() < 1e-12
+
+
+def test_a_bedding_slips_by_its_law():
+    """Pulled sideways by its own weight, the base slips by compliance x traction and creeps at fluidity x traction: the
+    sum of area x slip is the law times the force on the support, whatever the distribution of the traction."""
+    g = box((0.03, 0.03, 0.01), (4, 4, 3))
+    pull, interval = 2.0, 0.01
+    times = (np.arange(81) + 0.5) * interval  # a square: no frames beyond the last are run
+    scene = cases.plain(g, times, gravity=(pull, 0, 0), mass_damping=120.0)
+    elastic, fluid = 2e-6, 5e-7
+    out = run(scene.put({"support.compliance": jnp.asarray(elastic), "support.fluidity": jnp.asarray(fluid)}))
+    share = np.asarray(support.footprint(scene))
+    felt = np.asarray(out.reaction)[:, 0]
+    assert share.sum() == pytest.approx(0.03 * 0.03)
+    assert felt[-1] == pytest.approx(1000.0 * 0.03 * 0.03 * 0.01 * pull, rel=0.01)
+    slip = out.state.slip
+    assert share @ np.asarray(slip.elastic)[0] == pytest.approx(elastic * felt[-1], rel=1e-3)
+    assert share @ np.asarray(slip.viscous)[0] == pytest.approx(fluid * felt.sum() * interval, rel=5e-3)
+    assert np.abs(share @ np.asarray(slip.viscous)[1]) < 1e-3 * fluid * felt.sum() * interval
+
+
+def test_friction_slides_at_its_limit_and_sticks_below():
+    """A platen pressed on and dragged across a block that is held all round: |drag| = mu x push once it slides, and the
+    spring's stiffness times the way before."""
+    g = box(SIZE, (3, 2, 2))
+    rigid = Geometry(g.points, g.cells, g.cell_type, np.arange(len(g.points)))
+    scene = cases.plain(rigid, np.arange(2.0))
+    top = np.asarray(scene.body.facets)
+    up = np.isclose(np.asarray(g.points)[top][:, :, 2], SIZE[2]).all(1)
+    probe = build.probe(scene, Platen(), np.arange(2.0), np.tile([0, 0, SIZE[2]], (2, 1)), top[up], 1e8, 1e-7)
+    probe = scene.put({"probe": probe}).put({"probe.friction": jnp.asarray(0.25)}).probe
+    patch = contact.patch(scene.put({"probe": probe}))
+    u = jnp.zeros_like(scene.body.points.T)
+    deep = SIZE[2] - 1e-5
+    above = jnp.array([0, 0, SIZE[2] + 1e-5])
+    grip = contact.forces(probe, patch, u, above, contact.untouched(probe)).grip
+    push = 1e8 * 1e-5 * AREA
+    for way, drag in ((1e-6, 1e8 * 1e-6 * AREA), (4e-6, 0.25 * push)):
+        felt = contact.forces(probe, patch, u, jnp.array([way, 0, deep]), grip)
+        assert float(felt.force[2]) == pytest.approx(push, rel=1e-6)
+        assert float(felt.force[0]) == pytest.approx(-drag, rel=1e-6)
