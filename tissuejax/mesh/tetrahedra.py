@@ -1,5 +1,8 @@
 """Tets inside a closed surface, through the fTetWild generator (`pytetwild`, MPL-2.0)."""
 
+import contextlib
+import tempfile
+
 import numpy as np
 import trimesh
 
@@ -30,12 +33,14 @@ def fill(surface: trimesh.Trimesh, edge: float, support: float = 1e-4) -> Geomet
             "fill the holes (trimesh.repair.fill_holes) or mesh the organ by columns"
         )
     diagonal = float(np.linalg.norm(surface.extents))
-    points, cells = pytetwild.tetrahedralize(
-        np.asarray(surface.vertices),
-        np.asarray(surface.faces, np.int32),
-        edge_length_fac=edge / diagonal,
-        optimize=True,
-    )[:2]
+    # the generator leaves its working surface in the current folder, which is the user's
+    with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
+        points, cells = pytetwild.tetrahedralize(
+            np.asarray(surface.vertices),
+            np.asarray(surface.faces, np.int32),
+            edge_length_fac=edge / diagonal,
+            optimize=True,
+        )[:2]
     points, cells = np.asarray(points, float), np.asarray(cells, int)
     if not len(cells):
         raise InputError(
