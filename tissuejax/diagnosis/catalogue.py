@@ -45,6 +45,7 @@ class Form:
         grid: shapes to scan.
         nominated: False for forms that are only reached from a neighbour.
         each: parameters with a value of their own in every recording.
+        reach: how many times beyond the values scanned (or the default) a positive shape may go.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Form:
     grid: Mapping[str, tuple[float, ...]]
     nominated: bool = True
     each: tuple[str, ...] = ()
+    reach: float = 10.0
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ class Entry:
                 if name in form.each:
                     held += [f"{prefix}.{name}.{r}" for r in held_out]
                 for path in (*own, *(h for h in held if h.startswith(f"{prefix}.{name}."))):
-                    free[path] = limits(p, shape, form.grid.get(name, self.effect.grid.get(name, ())))
+                    free[path] = limits(p, shape, form.grid.get(name, self.effect.grid.get(name, ())), form.reach)
                     start[path] = float(self.effect.neutral[name])
             candidates.append(
                 Candidate(
@@ -117,13 +119,13 @@ def settings(grid: Mapping[str, tuple[float, ...]], paths: Mapping[str, list[str
     ) or ({},)
 
 
-def limits(p: Parameter, shape: bool, grid: tuple[float, ...]) -> Free:
-    """Range and scale of a parameter in a refit: declared bounds, and for shapes at most ten times beyond the grid."""
+def limits(p: Parameter, shape: bool, grid: tuple[float, ...], reach: float = 10.0) -> Free:
+    """Range and scale of a parameter in a refit: declared bounds, and for shapes at most `reach` beyond the grid."""
     lower, upper = p.lower, p.upper
     log = shape and p.lower >= 0 and p.default > 0
     if log:
         known = [v for v in (*grid, p.default) if v > 0]
-        lower, upper = max(lower, min(known) / 10), min(upper, max(known) * 10)
+        lower, upper = max(lower, min(known) / reach), min(upper, max(known) * reach)
     return Free(lower, upper, p.typical, p.unit, log=log)
 
 
@@ -222,8 +224,20 @@ def entries(sizes: Sizes) -> list[Entry]:
         "anisotropy": (  # along an axis of the test an angle has no slope to leave it by
             Anisotropy(),
             (
-                Form("in the xy plane", ("k1", "k2", "angle"), {"angle": tuple(0.15 + np.arange(4) * np.pi / 4)}),
-                Form("any direction", ("k1", "k2", "angle", "elevation"), {"elevation": (0.8, -0.8)}, nominated=False),
+                # skin stiffens with exponents of some tens
+                Form(
+                    "in the xy plane",
+                    ("k1", "k2", "angle"),
+                    {"angle": tuple(0.15 + np.arange(4) * np.pi / 4)},
+                    reach=100.0,
+                ),
+                Form(
+                    "any direction",
+                    ("k1", "k2", "angle", "elevation"),
+                    {"elevation": (0.8, -0.8)},
+                    nominated=False,
+                    reach=100.0,
+                ),
             ),
         ),
         "aging": (
