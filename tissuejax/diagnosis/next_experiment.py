@@ -154,7 +154,7 @@ def proposals(
         made, energy, tuple(made.recordings), (), dict.fromkeys(made.recordings, sigma), sizes=bench.sizes
     )
     names = [", ".join(dict.fromkeys(bench.candidates[k].name for k in r.keys)) for r in (chosen, rival)]
-    told = [trial.predict(_common(r)) for r in (chosen, rival)]
+    told = [trial.predict(shared(r)) for r in (chosen, rival)]
     old = [bench.jacobian(r.values, tuple(r.values), bench.fitted)[bench.mask(bench.fitted)] for r in (chosen, rival)]
     scale = bench.sigma[bench.mask(bench.fitted)][:, None]
     new = [_jacobian(trial, r) for r in (chosen, rival)]
@@ -179,7 +179,7 @@ def against(d: Float[np.ndarray, " n"], old: Float[np.ndarray, "m k"], new: Floa
     return float(left @ left)
 
 
-def _common(r: Refit) -> dict[str, float]:
+def shared(r: Refit) -> dict[str, float]:
     """Values that hold in a new recording: what belongs to one recording alone is not known there."""
     return {p: v for p, v in r.values.items() if not _own(p)}
 
@@ -189,7 +189,7 @@ def _own(path: str) -> bool:
 
 
 def _jacobian(trial: MaterialBench, r: Refit) -> np.ndarray:
-    common = _common(r)
+    common = shared(r)
     jac = trial.jacobian(common, tuple(common))
     out = np.zeros((len(trial.y), len(r.values)))
     for i, path in enumerate(r.values):
