@@ -22,6 +22,8 @@ from tissuejax.fitting.least_squares import fit as fit_problem
 from tissuejax.fitting.probed import fit_probed
 from tissuejax.fitting.result import Fit
 from tissuejax.fitting.setup import problem, split
+from tissuejax.fitting.stress_curve import METHOD as STRESS_CURVE
+from tissuejax.fitting.stress_curve import fit_stress_curve
 from tissuejax.model import Model
 from tissuejax.progress import Progress, Silent
 from tissuejax.recordings.files import read
@@ -99,14 +101,14 @@ def fit(
         free, fix, start, bounds, priors: by dotted path, SI; see `fitting.setup.problem`.
         weights, channels, loss: what a unit of misfit means.
         stable: keep the energy stable (Drucker) over the recorded stretches.
-        method: "levenberg-marquardt", "adam" or "lbfgs".
+        method: "levenberg-marquardt", "adam" or "lbfgs"; for a probing also "stress-curve", the source's iteration.
         multistart, seed: number of starts and seed of those after the first.
         max_steps: evaluations for each start.
         progress: told after every accepted step.
         checkpoint: for probings, a file that keeps the last iterate; a killed fit goes on from there.
 
-    Probings are fitted by `fitting.probed.fit_probed`: from one start, whatever `method` and `multistart` say, with a
-    volumetric energy K/2 (J-1)^2 if none is named.
+    Probings are fitted by `fitting.probed.fit_probed` (forward-mode least squares): from one start, whatever
+    `multistart` says, with a volumetric energy K/2 (J-1)^2 if none is named.
 
     Returns:
         The fit: `values`, `std`, `channels`, `holdout`, `warnings`, `record()`.
@@ -134,6 +136,8 @@ def fit(
         stable=stable,
     )
     with (progress or Silent()).stage(f"fitting {energy.energy.name} to {sample.name}", None) as stage:
+        if method == STRESS_CURVE:
+            return fit_stress_curve(posed, holdout=held)
         if probing:  # each run is a simulation: one start, few runs, errors that include the numerical one
             return fit_probed(
                 posed, holdout=held, max_steps=min(max_steps, 12), progress=progress, checkpoint=checkpoint

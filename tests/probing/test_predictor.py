@@ -64,7 +64,7 @@ def test_effects_at_neutral_leave_the_scene_as_it_is(base):
             assert np.array_equal(a, b), (effect.name, part)
         assert np.array_equal(scene.stiffness, plain.stiffness), effect.name
         shown = {"force": Channel(np.arange(4.0), np.random.default_rng(0).normal(size=(4, 3)), "N")}
-        shown["markers"] = Channel(np.arange(4.0), MARKERS + np.zeros((4, 1, 1)), "m")
+        shown["markers"] = Channel(np.arange(4.0), np.asarray(setup.test.rest) + np.zeros((4, 1, 1)), "m")
         p = {k: np.asarray(v) for k, v in effect.neutral.items()}
         for name, channel in effect.channels(p, setup.test, shown).items():
             assert np.array_equal(channel.values, shown[name].values), effect.name
@@ -99,6 +99,8 @@ def test_derivatives_equal_difference_quotients():
         "effects.viscoelasticity.g1": 0.2,
         "effects.inclusion.contrast": 0.5,
     }
+    # a sampled path has corners, and a step that falls on one has one-sided derivatives only (8 % apart at no delay)
+    values |= {"effects.contact-offset.delay": 1.3e-3}
     values |= {"effects.periodic.sin.r1": 3e-4, "effects.clock-lag.lag": 0.02, "effects.registration.turn": 0.1}
     bare = p.model.across(())
     from tissuejax.experiments.homogeneous import local
@@ -107,8 +109,6 @@ def test_derivatives_equal_difference_quotients():
     theta = _vector(known)
     scale = np.array([bare.declared[path].typical for path in known])
     direction = np.random.default_rng(1).normal(size=len(theta)) * scale
-    # a delay moves the corners of a sampled path over the steps: there only one-sided derivatives exist
-    direction[[path == "effects.contact-offset.delay" for path in known]] = 0
     h = 1e-6
 
     def run(x):
@@ -120,6 +120,18 @@ def test_derivatives_equal_difference_quotients():
         quotient = (np.asarray(up.channels[name]) - np.asarray(down.channels[name])) / (2 * h)
         error = np.linalg.norm(quotient - np.asarray(slopes[name][0])) / np.linalg.norm(quotient)
         assert error < 1e-4, (name, error)  # friction has kinks of its own
+
+
+@pytest.mark.slow
+def test_half_the_compression_tells_the_error_of_the_compression():
+    """Force at 8 times life against 4 times, times 4/3, is the error of 8 times (against once), within a third."""
+    force = {}
+    for f in (8.0, 4.0, 1.0):
+        out = predictor(model(), sample(), settings=replace(PRECISE, compression=f, interval=0.04)).predict(VALUES)
+        force[f] = np.asarray(out["r1"].channels["force"].values)
+    told, true = 4 / 3 * (force[8.0] - force[4.0]), force[8.0] - force[1.0]
+    assert np.linalg.norm(told) == pytest.approx(np.linalg.norm(true), rel=1 / 3)
+    assert np.linalg.norm(told - true) < 0.5 * np.linalg.norm(true)
 
 
 def test_jacobian_has_a_column_for_each_path_and_zero_where_it_does_not_act(monkeypatch):

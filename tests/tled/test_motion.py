@@ -82,6 +82,19 @@ def test_a_step_above_the_critical_one_is_refused_and_one_forced_in_is_caught():
         run(wild)
 
 
+def test_a_burst_names_the_element_in_which_it_began():
+    """One element is made so stiff that the step is too long for it; by the next look all nodes are NaN."""
+    g = box((0.05, 0.05, 0.05), (5, 5, 5))
+    times = np.arange(1, 26) * 0.01
+    scene = cases.plain(g, times, gravity=(0, 0, -9.81))
+    middle = 62
+    field = jnp.ones(len(g.cells)).at[middle].set(12.0)
+    with pytest.raises(UnstableSimulation, match=r"broke down by t = .* element \d+ near .* smaller step") as caught:
+        run(scene.put({"tissue.stiffness": field}))
+    named = int(str(caught.value).split("element ")[1].split()[0])
+    assert np.isin(g.cells[named], g.cells[middle]).any()  # the element itself or one that touches it
+
+
 def test_a_probe_that_starts_inside_or_stays_away_is_refused():
     g = box((0.03, 0.03, 0.012), (5, 5, 3))
     t = np.arange(3.0)

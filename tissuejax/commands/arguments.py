@@ -61,7 +61,10 @@ def add_fit(parser: argparse.ArgumentParser) -> None:
         "--loss", default="squares", metavar="KIND", help="squares (default), soft-l1 or cauchy (robust to outliers)"
     )
     parser.add_argument(
-        "--method", default="levenberg-marquardt", metavar="NAME", help="levenberg-marquardt (default), adam, lbfgs"
+        "--method",
+        default="levenberg-marquardt",
+        metavar="NAME",
+        help="levenberg-marquardt (default), adam, lbfgs; for one probing also stress-curve",
     )
     parser.add_argument("--multistart", type=int, default=4, metavar="N", help="number of starts (default 4)")
     parser.add_argument(

@@ -14,6 +14,8 @@ from tissuejax.report import sentences
 from tissuejax.report.page import write_fit
 from tissuejax.storage import write_text
 
+KEPT = "checkpoint.json"  # the last iterate of a fit of probings, until it has ended
+
 
 class FitCommand(Command):
     """Fit a sample and write result.json, report.html and figures."""
@@ -31,7 +33,13 @@ into --out: result.json (every number), report.html (one page to read and keep) 
   tissuejax fit liver.h5 --energy reduced-polynomial-2 --holdout r3 --out out/liver
   tissuejax fit rubber.toml --energy ogden-3 --ogden-form mu/alpha --out out/rubber
   tissuejax fit specimens.toml --each --energy reduced-polynomial-3          every sample of a file, one table
+  tissuejax fit probing.h5 --energy reduced-polynomial-2 --holdout r3        force and markers of probings together
   tissuejax fit skin.toml --energy demiray+fibre --fix "energy.kappa=0.1" --bounds "energy.k2=0:50"
+
+A fit of probings simulates, so it takes minutes; killed, it goes on from its last iterate when the same command is
+given again (--out holds checkpoint.json until it has ended). All recordings share one material; --only NAME fits one
+site.
+--method stress-curve is the manual iteration of the source made automatic, for comparison.
 
 Exit code 0: done; 2: the input can't be used (the message says why); 3: the search did not converge (what was found is
 written all the same, with a warning on top).
@@ -55,9 +63,11 @@ written all the same, with a warning on top).
         model = verbs.material(
             given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
         ).across(tuple(sample.recordings))
-        found = verbs.fit(sample, model, progress=for_terminal(), **fit_options(given, model.parameters))
-        written = verbs.write(found, given.out or Path("out") / sample.name)
-        return reply(found, written)
+        out = given.out or Path("out") / sample.name
+        found = verbs.fit(
+            sample, model, progress=for_terminal(), checkpoint=out / KEPT, **fit_options(given, model.parameters)
+        )
+        return reply(found, verbs.write(found, out))
 
     def _each(self, given: argparse.Namespace) -> Reply:
         """Every sample of a file: result.json for each, one table of all parameters."""

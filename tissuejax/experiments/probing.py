@@ -63,6 +63,7 @@ class Simulated(NamedTuple):
         failed, element: -1, or the frame by which the run broke down and the element.
         inertia: greatest kinetic over greatest internal energy. depth: greatest penetration, m.
         ballast: mass added to hold the step, over the mass of the body.
+        displacement: of the nodes at the end, m.
     """
 
     channels: dict[str, Float[Array, "..."]]
@@ -71,6 +72,7 @@ class Simulated(NamedTuple):
     inertia: Float[Array, ""]
     depth: Float[Array, ""]
     ballast: Float[Array, ""]
+    displacement: Float[Array, "N 3"] | None = None
 
 
 def assembled(model: Model, values: Mapping[str, Array], setup: Setup) -> tuple[Scene, Float[Array, ""]]:
@@ -135,7 +137,7 @@ def simulated(model: Model, values: Mapping[str, Array], setup: Setup) -> Simula
     times = {"force": setup.force_times, "markers": setup.marker_times}
     poison = jnp.where(out.failed >= 0, jnp.nan, 0.0)  # a broken run must never look like a prediction
     read = {name: read_at(times[name], ch.time, ch.values) + poison for name, ch in channels.items()}
-    return Simulated(read, out.failed, out.element, out.inertia, out.depth, ballast)
+    return Simulated(read, out.failed, out.element, out.inertia, out.depth, ballast, out.state.u.T)
 
 
 def _about_rest(markers: Float[Array, "n k 3"], setup: Setup) -> Float[Array, "n k 3"]:

@@ -8,6 +8,7 @@ Jacobian).
 """
 
 import hashlib
+import json
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -28,6 +29,7 @@ from tissuejax.fitting.sparing import sparing
 from tissuejax.fitting.stability import recorded_stability
 from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
 from tissuejax.progress import Progress, Silent
+from tissuejax.recordings.recording import Recording
 
 METHOD = "sparing"
 # what is left to the limit, over the change just seen: the mesh error falls with h^2 and the final mesh is the finer
@@ -44,7 +46,8 @@ class ProbedFit:
         shifts: for each numerical choice ("mesh", "step", "penalty"), how far it holds a free parameter off its limit.
         numerical: root mean square numerical error of each "recording/channel", SI.
         noise_std: standard errors from noise alone.
-        simulations: forward runs and Jacobians spent, a run being one recording set.
+        simulations: forward runs (those for the numerical error and the finer mesh included) and Jacobians spent, a
+            run being all fitted recordings.
     """
 
     fit: Fit
@@ -95,7 +98,7 @@ def fit_probed(
         raise InputError("fit_probed takes a predictor of probings; use fit for material tests")
     begun = time.perf_counter()
     coarse = replace(problem, predictor=fine.with_settings(fine.settings.coarse))
-    box, spent = problem.box, {"forward": 0, "jacobian": 0}
+    box, spent, told = problem.box, {"forward": 0, "jacobian": 0}, Told()
     kept = Checkpoint(checkpoint, problem)
     start = kept.values()
     with (progress or Silent()).stage(f"fitting {', '.join(fine.names)}", None) as stage:
@@ -103,7 +106,9 @@ def fit_probed(
         def residuals(y):
             spent["forward"] += 1
             stage.advance(note="simulation")
-            return problem.residuals(problem.values(box.bounded(y)[0]))
+            r = told.residuals(problem, problem.values(box.bounded(y)[0]))
+            kept.before = kept.before or vector_errors(problem, r)
+            return r
 
         def jacobian(y):
             spent["jacobian"] += 1
@@ -124,17 +129,18 @@ def fit_probed(
         J, cost = J / slope, descent.cost
         kept.keep(problem.values(x))
         stage.advance(note="numerical error")
-        shifts, sizes = numerical_shifts(problem, problem.values(x), r, J) if numerical else ({}, {})
+        shifts, sizes = numerical_shifts(problem, problem.values(x), r, J, told) if numerical else ({}, {})
         if finish:
             stage.advance(note="finer mesh")
-            problem, x, r = finished(problem, x, J)
+            problem, x, r = finished(problem, x, J, told)
             cost = 0.5 * float(r @ r)
-            spent["forward"] += 2
         final, values = problem.predictor, problem.values(x)
         kept.keep(values)
-        fitted = dict(final.predict(values))
+        before, after = kept.before, vector_errors(problem, r)
+        fitted = dict(told(problem, values))
         stage.advance(note="held out")
         held = dict(final.of(holdout).predict(values)) if holdout else {}
+    spent["forward"] = told.runs
     noise_part = _noise_part(problem, x, J, r)
     spread = _with_shifts(noise_part, [np.array(list(s.values())) for s in shifts.values()])
     measured = fine.sample.recordings
@@ -158,6 +164,10 @@ def fit_probed(
         n_evaluations=descent.n_evaluations,
         seconds=time.perf_counter() - begun,
         method=METHOD,
+        sites={
+            name: {c: {"before": before[name][c], "after": rms} for c, rms in channels.items()}
+            for name, channels in after.items()
+        },
     )
     found.warnings.extend(warnings_of(found))
     if shifts:
@@ -167,15 +177,48 @@ def fit_probed(
     return ProbedFit(found, shifts, sizes, noise_std, spent)
 
 
-def finished(problem: Problem, x: Float[np.ndarray, " p"], jacobian: Float[np.ndarray, "n p"]):
+def vector_errors(problem: Problem, residuals: Float[np.ndarray, " n"]) -> dict[str, dict[str, float]]:
+    """Root mean square length of the error vectors by recording and channel, SI (Lister 2012, eq. 2.2, 2.3, corrected:
+    the mean over the samples summed)."""
+    found: dict[str, dict[str, float]] = {}
+    for key, rows in problem.rows.items():
+        error = residuals[rows] * problem.sigma(key)
+        found.setdefault(key[0], {})[key[1]] = float(np.sqrt(3 * np.mean(error**2)))
+    return found
+
+
+class Told:
+    """Predictions made so far, so that nothing is simulated twice."""
+
+    def __init__(self):
+        self.made: dict[tuple, Mapping[str, Recording]] = {}
+
+    def __call__(self, problem: Problem, values: Mapping[str, float]) -> Mapping[str, Recording]:
+        """The prediction of the fitted recordings."""
+        key = (problem.predictor.settings, *sorted(values.items()))
+        if key not in self.made:
+            self.made[key] = problem.predictor.predict(dict(values))
+        return self.made[key]
+
+    def residuals(self, problem: Problem, values: Mapping[str, float]) -> Float[np.ndarray, " n"]:
+        """Its residuals."""
+        return problem.misfit(self(problem, values), values)
+
+    @property
+    def runs(self) -> int:
+        """How many were simulated."""
+        return len(self.made)
+
+
+def finished(problem: Problem, x: Float[np.ndarray, " p"], jacobian: Float[np.ndarray, "n p"], told: Told):
     """The problem on the finer mesh, the estimate after one step there with given derivatives, and its residuals."""
     settings = problem.predictor.settings
     finer = replace(problem, predictor=problem.predictor.with_settings(settings.finer))
-    before = finer.residuals(finer.values(x))
+    before = told.residuals(finer, finer.values(x))
     step = x - np.linalg.lstsq(jacobian, before, rcond=None)[0]
     lower, upper = (np.array(v) for v in zip(*(problem.bound(path) for path in problem.free), strict=True))
     step = np.clip(step, lower, upper)
-    after = finer.residuals(finer.values(step))
+    after = told.residuals(finer, finer.values(step))
     return (finer, step, after) if after @ after < before @ before else (finer, x, before)
 
 
@@ -184,6 +227,7 @@ def numerical_shifts(
     values: Mapping[str, float],
     residuals: Float[np.ndarray, " n"],
     jacobian: Float[np.ndarray, "n p"],
+    told: Told,
 ) -> tuple[dict[str, dict[str, float]], dict[str, float]]:
     """How far mesh, step and penalty hold the estimate off its limit, and how far the prediction moves.
 
@@ -195,11 +239,12 @@ def numerical_shifts(
         values: the estimate.
         residuals: there.
         jacobian: of the residuals to the free parameters, at the estimate.
+        told: keeps the predictions.
     """
     predictor = problem.predictor
     shifts, squares = {}, {}
     for choice, settings in predictor.settings.varied.items():
-        other = replace(problem, predictor=predictor.with_settings(settings)).residuals(values)
+        other = told.residuals(replace(problem, predictor=predictor.with_settings(settings)), values)
         change = REMAINS[choice] * (other - residuals)
         for key, rows in problem.rows.items():
             d = change[rows] * problem.sigma(key)
@@ -237,6 +282,7 @@ class Checkpoint:
 
     def __init__(self, path: Path | None, problem: Problem):
         self.path, self.problem = (None if path is None else Path(path)), problem
+        self.before: dict[str, dict[str, float]] = {}  # errors at the very start
         parts = (problem.predictor.model, problem.predictor.names, problem.free, problem.predictor.settings)
         numbers = [problem.measured[k].tobytes() for k in problem.channels]
         self.mark = hashlib.sha256(repr(parts).encode() + b"".join(numbers)).hexdigest()
@@ -246,15 +292,16 @@ class Checkpoint:
         start = {path: float(v) for path, v in self.problem.start.items()}
         if self.path is None or not self.path.exists():
             return start
-        import json
-
         kept = json.loads(self.path.read_text())
-        return start | kept["values"] if kept.get("mark") == self.mark else start
+        if kept.get("mark") != self.mark:
+            return start
+        self.before = kept["before"]
+        return start | kept["values"]
 
     def keep(self, values: Mapping[str, float]) -> None:
         """Note accepted values."""
         if self.path is not None:
-            storage.write_json(self.path, {"mark": self.mark, "values": dict(values)})
+            storage.write_json(self.path, {"mark": self.mark, "values": dict(values), "before": self.before})
 
     def done(self) -> None:
         """The fit has ended: nothing to resume."""

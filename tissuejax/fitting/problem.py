@@ -18,6 +18,7 @@ from tissuejax.fitting.losses import checked_loss
 from tissuejax.fitting.stability import penalty_rows
 from tissuejax.fitting.transforms import Box, checked_bounds
 from tissuejax.fitting.weights import Noise
+from tissuejax.recordings.recording import Recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +154,7 @@ class Problem:
 
     def residuals(self, values: Mapping[str, float]) -> Float[np.ndarray, " n"]:
         """(predicted - measured) / sigma, then the priors; one forward run of the model."""
-        return self._stack(self.predictor.predict(dict(values)), values)
+        return self.misfit(self.predictor.predict(dict(values)), values)
 
     def linearised(self, values: Mapping[str, float]) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n p"]]:
         """Residuals and their Jacobian to the free parameters; one forward-mode run.
@@ -168,13 +169,14 @@ class Problem:
                 jacobian[rows, column] = slope / self.sigma(key)
             for row, (prior, (_, std)) in enumerate(self.priors.items(), start=self.n_samples):
                 jacobian[row, column] = (prior == path) / std
-        r = self._stack(predicted, values)
+        r = self.misfit(predicted, values)
         if self.stiffness:
             rows, slopes = penalty_rows(self.predictor, values, self.free, self.stiffness)
             r, jacobian = np.concatenate([r, rows]), np.concatenate([jacobian, slopes])
         return r, jacobian
 
-    def _stack(self, predicted, values) -> Float[np.ndarray, " n"]:
+    def misfit(self, predicted: Mapping[str, Recording], values: Mapping[str, float]) -> Float[np.ndarray, " n"]:
+        """Residuals of a prediction that is there already."""
         parts = []
         for (recording, channel), kept in self.seen.items():
             value = np.asarray(predicted[recording].channels[channel].values, float).ravel()[kept]

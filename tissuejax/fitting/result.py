@@ -49,6 +49,8 @@ class Fit:
         seconds: wall time, compilation included.
         warnings: sentences for the reader.
         method: how it was minimised.
+        sites: for probings, root mean square length of the error vectors of each recording and channel, SI, at the
+            start and at the end ("before", "after"; Lister 2012, eq. 2.2 and 2.3).
     """
 
     problem: Problem
@@ -67,6 +69,7 @@ class Fit:
     seconds: float
     warnings: list[str] = field(default_factory=list)
     method: str = "levenberg-marquardt"
+    sites: Mapping[str, Mapping[str, Mapping[str, float]]] = field(default_factory=dict)
 
     @property
     def converged(self) -> bool:
@@ -134,6 +137,7 @@ class Fit:
             },
             "channels": {key: s.record() for key, s in self.channels.items()},
             "holdout": {key: s.record() for key, s in self.holdout.items()},
+            **({"sites": self.sites} if self.sites else {}),
             "warnings": list(self.warnings),
             "starts": self.starts,
             "n_evaluations": self.n_evaluations,

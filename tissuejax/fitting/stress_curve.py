@@ -6,24 +6,31 @@ tissue is thick; the energy is fitted to T_a, checked for stability, and the pro
 2.2.5). Kept for comparison: it needs no derivative, uses one number a depth and no marker.
 """
 
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
-from tissuejax.errors import UnstableSimulation
+from tissuejax.errors import InputError, UnstableSimulation
 from tissuejax.experiments.predictor import predictor
 from tissuejax.experiments.probing_predictor import ProbingPredictor
 from tissuejax.fitting.least_squares import descend
+from tissuejax.fitting.problem import Problem
+from tissuejax.fitting.result import Fit, Iterate
+from tissuejax.fitting.scores import scores
 from tissuejax.fitting.setup import problem
 from tissuejax.fitting.stability import recorded_stability
+from tissuejax.fitting.uncertainty import Uncertainty
 from tissuejax.model import Model
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 LEAST = 0.02  # share of the greatest force below which a ratio of forces is noise
 CAP = 8.0  # largest factor on the stress in one iteration
 POINTS = 25
+ITERATIONS = 4  # as many as the source made
+METHOD = "stress-curve"
 
 
 @dataclass(frozen=True)
@@ -36,8 +43,58 @@ class Turn:
     stable: bool
 
 
+def fit_stress_curve(posed: Problem, *, holdout: tuple[str, ...] = (), iterations: int = ITERATIONS) -> Fit:
+    """The iteration as a fit of one probing: values, errors before and after, no standard errors.
+
+    Raises:
+        InputError: other experiments, or more than one recording.
+    """
+    probing, begun = posed.predictor, time.perf_counter()
+    if not isinstance(probing, ProbingPredictor) or len(probing.names) > 1:
+        raise InputError(
+            f"the stress-curve iteration takes one probing, got {', '.join(probing.names)}: name one with --only, or "
+            "leave --method out"
+        )
+    (name,) = probing.names
+    measured = probing.sample.recordings
+    values, turns = stress_curve(probing, name, posed.start, iterations)
+    fitted, held = probing.predict(values), dict(probing.of(holdout).predict(values)) if holdout else {}
+    std = dict(posed.noise.std)
+    for other in holdout:
+        for channel, series in measured[other].channels.items():
+            std[f"{other}/{channel}"] = series.noise_std or std.get(f"{name}/{channel}", 1.0)
+    told = scores(measured, fitted, std)
+    p = len(posed.free)
+    unknown = np.full((p, p), np.nan)
+    runs = [t.force_rmse for t in turns]
+    force, markers = errors(measured[name], fitted[name])
+    sites = {"force": {"before": runs[0], "after": force}}
+    if markers is not None:
+        sites["markers"] = {"before": turns[0].marker_rmse, "after": markers}
+    said = "The stress-curve iteration gives no standard errors, and nothing tells whether another turn would help."
+    return Fit(
+        problem=posed,
+        status="converged" if abs(runs[-1] - runs[-2]) < 0.05 * runs[-2] else f"stopped after {iterations} iterations",
+        values=values,
+        uncertainty=Uncertainty(np.full(p, np.inf), unknown, unknown, np.inf, (said,)),
+        at_bound={},
+        chi2=sum(s.chi2_per_sample * s.n for s in told.values()),
+        channels=told,
+        holdout=scores(measured, held, std),
+        predictions=dict(fitted) | held,
+        trace=[Iterate(i, (t.force_rmse / std[f"{name}/force"]) ** 2, t.values) for i, t in enumerate(turns, 1)],
+        stability=recorded_stability(probing, values),
+        starts=[],
+        n_evaluations=len(turns) + 1,
+        seconds=time.perf_counter() - begun,
+        warnings=[said],
+        method=METHOD,
+        sites={name: sites},
+    )
+
+
 def stress_curve(
-    probing: ProbingPredictor, name: str, start: Mapping[str, float], iterations: int = 4
+    probing: ProbingPredictor, name: str, start: Mapping[str, float], iterations: int = ITERATIONS
 ) -> tuple[dict[str, float], list[Turn]]:
     """Values after some iterations on one recording, and how it went; the first turn is the start.
 

@@ -75,6 +75,7 @@ def write_fit(found: Fit, out: Path, pictures: bool = True) -> dict[str, Path]:
         steps=sentences.next_steps(found),
         parameters=sentences.table(found),
         errors=sentences.errors(found),
+        sites=sentences.sites(found),
         figures=drawn,
     )
     written["page"] = write_text(out / "report.html", page)

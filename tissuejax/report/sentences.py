@@ -130,3 +130,15 @@ def errors(found: Fit) -> list[dict[str, str]]:
                 }
             )
     return rows
+
+
+def sites(found: Fit) -> list[dict[str, str]]:
+    """Rows of the table of probed sites: error vectors before and after."""
+    rows = []
+    for name, channels in found.sites.items():
+        for channel, errors in channels.items():
+            unit = "N" if channel == "force" else "m"
+            factor, shown = display(unit, errors["after"])
+            before, after = (f"{errors[k] / factor:.3g} {shown}" for k in ("before", "after"))
+            rows.append({"site": name, "channel": channel, "before": before, "after": after})
+    return rows

@@ -1,0 +1,116 @@
+"""A fit of a small probing: found again on hexes and on tets, and taken up where a killed one was."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import equinox as eqx
+import numpy as np
+import pytest
+
+from tests.probing.bench import BODY, QUICK, VALUES, measured, model, recording, sample
+from tissuejax.effects.catalogue import suited
+from tissuejax.errors import InputError
+from tissuejax.experiments.predictor import predictor
+from tissuejax.fitting.probed import fit_probed
+from tissuejax.fitting.setup import problem
+from tissuejax.fitting.stress_curve import fit_stress_curve
+from tissuejax.recordings.recording import Geometry, Sample
+
+START = {"energy.C10": 800.0}
+KNOWN = {"energy.C20": 300.0, "volumetric.K": 10e3}
+
+
+def tets() -> Geometry:
+    """The bench's box in tetrahedra, six a hex."""
+    six = [(0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)]
+    cells = np.concatenate([np.asarray(BODY.cells)[:, list(t)] for t in six])
+    return Geometry(BODY.points, cells, "tetra", BODY.fixed)
+
+
+def posed(geometry=BODY, settings=QUICK):
+    """One recording with noise, made by the simulator at `VALUES`; C10 is sought from 60 % above."""
+    blank = sample(recording(), geometry=geometry)
+    told = predictor(model(), blank, settings=settings).predict(VALUES)["r1"]
+    noisy = measured(told, blank.recordings["r1"], np.random.default_rng(5))
+    p = predictor(model(), Sample("bench", {"r1": noisy}, geometry, 1000.0), settings=settings)
+    return problem(p, start=START, fix=KNOWN)
+
+
+@pytest.mark.parametrize("geometry", [BODY, tets()], ids=["hexes", "tets"])
+def test_the_stiffness_is_found_again(geometry):
+    settings = QUICK if geometry is BODY else replace(QUICK, step=4e-4)
+    found = fit_probed(posed(geometry, settings), numerical=False, finish=False).fit
+    assert found.converged, found.status
+    assert abs(found.values["energy.C10"] - VALUES["energy.C10"]) < 3 * found.std["energy.C10"]
+    assert found.std["energy.C10"] < 0.02 * VALUES["energy.C10"]
+    # the rest of the markers is itself a mean over few noisy frames, which adds a sixth to their chi-square
+    assert 0.9 < found.chi2_per_dof < 1.25
+    errors = found.sites["r1"]
+    assert errors["force"]["after"] == pytest.approx(3**0.5 * 0.003, rel=0.1)
+    assert errors["force"]["before"] > 5 * errors["force"]["after"]
+    assert errors["markers"]["after"] <= errors["markers"]["before"]
+
+
+def test_the_stress_curve_iteration_takes_one_site_and_lowers_its_force_error():
+    found = fit_stress_curve(posed(), iterations=2)
+    force = found.sites["r1"]["force"]
+    assert force["after"] < force["before"] / 3
+    assert found.method == "stress-curve"
+    assert found.record()["sites"]["r1"]["force"] == force
+    two = predictor(model(), sample(recording("a"), recording("b")), settings=QUICK)
+    with pytest.raises(InputError, match="takes one probing, got a, b"):
+        fit_stress_curve(problem(two, start=START, fix=KNOWN))
+
+
+def fit(checkpoint, on_accept=None):
+    return fit_probed(posed(), checkpoint=checkpoint, numerical=False, finish=False, on_accept=on_accept)
+
+
+def test_an_interrupted_fit_goes_on_from_its_last_accepted_values(tmp_path):
+    kept = tmp_path / "checkpoint.json"
+    whole = fit(None)
+
+    def interrupted(n, chi2, values):
+        if abs(values["energy.C10"] - START["energy.C10"]) > 1.0:  # after the first step away from the start
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fit(kept, interrupted)
+    assert kept.exists()
+    rest = fit(kept)
+    assert rest.simulations["jacobian"] < whole.simulations["jacobian"]
+    assert rest.fit.values["energy.C10"] == pytest.approx(whole.fit.values["energy.C10"], rel=1e-3)
+    assert not kept.exists()
+
+
+@pytest.mark.slow
+def test_a_killed_fit_goes_on_from_its_last_accepted_values(tmp_path):
+    """The process is killed outright (SIGKILL) after its first accepted step; another one takes the fit up."""
+    kept = tmp_path / "checkpoint.json"
+    script = (
+        "import os, signal, jax\n"
+        "jax.config.update('jax_enable_x64', True)\n"
+        "from tests.probing.test_fit_small import START, fit\n"
+        "def stop(n, chi2, values):\n"
+        "    if abs(values['energy.C10'] - START['energy.C10']) > 1e-9: os.kill(os.getpid(), signal.SIGKILL)\n"
+        f"fit({str(kept)!r}, stop)\n"
+    )
+    root = Path(__file__).parents[2]
+    died = subprocess.run([sys.executable, "-c", script], cwd=root, check=False)
+    assert died.returncode == -9
+    rest, whole = fit(kept), fit(None)
+    assert rest.simulations["jacobian"] < whole.simulations["jacobian"]
+    assert rest.fit.values["energy.C10"] == pytest.approx(whole.fit.values["energy.C10"], rel=1e-3)
+
+
+def test_gravity_without_density_is_refused():
+    with pytest.raises(InputError, match="gravity needs the density"):
+        predictor(model(suited("gravity", "probing")), sample(density=None), settings=QUICK)
+
+
+def test_a_fixed_set_on_a_line_floats():
+    row = np.flatnonzero(np.isclose(BODY.points[:, 2], 0) & np.isclose(BODY.points[:, 1], BODY.points[:, 1].min()))
+    with pytest.raises(InputError, match="floats"):
+        predictor(model(), sample(geometry=eqx.tree_at(lambda g: g.fixed, BODY, row)), settings=QUICK)
