@@ -162,7 +162,14 @@ def entries(sizes: Sizes) -> list[Entry]:
             (
                 Form("one time", ("g1", "tau1"), {"tau1": TIMES}),
                 Form("two times", ("g1", "g2", "tau1", "tau2"), pairs),
+                Form("two times of the moduli", ("g1", "g2", "tau1", "tau2", "moduli"), {**pairs, "moduli": (1.0,)}),
                 Form("three times", ("g1", "g2", "g3", "tau1", "tau2", "tau3"), {}, nominated=False),
+                Form(
+                    "three times of the moduli",
+                    ("g1", "g2", "g3", "tau1", "tau2", "tau3", "moduli"),
+                    {"moduli": (1.0,)},
+                    nominated=False,
+                ),
             ),
         ),
         "softening": (
@@ -244,6 +251,7 @@ def entries(sizes: Sizes) -> list[Entry]:
             Aging(),
             (
                 Form("", ("rate",), {}),
+                Form("straight", ("rate", "straight"), {"straight": (1.0,)}, nominated=False),
                 Form(
                     "settling",
                     ("rate", "settling"),

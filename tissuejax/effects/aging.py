@@ -17,7 +17,8 @@ from tissuejax.recordings.recording import Channel
 class Aging(Effect):
     """S = exp(rate T) S_e, T the time since the first recording: `start` of the recording plus its own time.
 
-    With `settling` s, T counts as (1 - exp(-s T))/s: dying out for s > 0, gathering pace for s < 0.
+    With `settling` s, T counts as (1 - exp(-s T))/s: dying out for s > 0, gathering pace for s < 0. With `straight` q
+    the factor is (1 + q rate T)^(1/q): a straight line in time at 1.
 
     Revealed by later recordings that are stiffer or softer than earlier ones of the same kind. Blind: a single short
     recording, and recordings without `start` (only the drift inside each is then seen).
@@ -37,11 +38,15 @@ class Aging(Effect):
         settling = "rate at which the drift dies out, or gathers pace if negative"
         return (
             Parameter("rate", "1/s", 0.0, lower=-1.0, upper=1.0, scale=1e-4, meaning=meaning),
+            Parameter("straight", "1", 0.0, lower=0.0, upper=2.0, scale=0.2, frozen=True, meaning="1: linear in time"),
             Parameter("settling", "1/s", 0.0, lower=-0.02, upper=1.0, scale=1e-3, frozen=True, meaning=settling),
         )
 
     def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:
-        return state.scaled(jnp.exp(p["rate"] * dying(test.start + test.elapsed, p["settling"])))
+        power, q = p["rate"] * dying(test.start + test.elapsed, p["settling"]), p["straight"]
+        straight = q > 1e-3
+        q = jnp.where(straight, q, 1.0)
+        return state.scaled(jnp.exp(jnp.where(straight, jnp.log1p(jnp.maximum(q * power, -0.999)) / q, power)))
 
     def channels(
         self, p: Mapping[str, Array], test: ProbingTest, channels: Mapping[str, Channel]

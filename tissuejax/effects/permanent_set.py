@@ -16,12 +16,13 @@ class PermanentSet(Effect):
     """Elastic strain = strain - amount (largest + smallest strain so far), strain being stretch - 1 or shear.
 
     The stress-free length follows the extremes of the past, in tension and in compression alike. Strain below
-    `threshold` leaves nothing behind (0 unless named). Stretch l is strained by (l^m - 1)/m, m being `measure`: 1 unless
+    `threshold` leaves nothing behind (0 unless named). Strain is (l^m - 1)/m of stretch l, m being `measure`: 1 unless
     named, 0 the logarithm (a set that multiplies the length in place of adding to it).
 
     Revealed by stress of the opposite sign when the specimen is brought back to its first length, and by a shifted
     origin in later cycles. Blind: monotonic loading (the amount is then taken up by the stiffness).
-    Source: Seth 1964 (family of strain measures); Mullins 1969, Rubber Chem. Technol. 42; Diani, Fayolle and Gilormini 2009, Eur. Polym. J. 45, sec. 2.
+    Source: Seth 1964 (family of strain measures); Mullins 1969, Rubber Chem. Technol. 42; Diani, Fayolle and Gilormini
+    2009, Eur. Polym. J. 45, sec. 2.
     """
 
     name: ClassVar[str] = "permanent-set"

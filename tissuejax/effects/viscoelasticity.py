@@ -22,7 +22,8 @@ class Viscoelasticity(Effect):
 
     S_e is the elastic isochoric PK2 stress; with `moduli` it is instead 2 dpsi/dCbar before the isochoric projection,
     which is applied afterwards: then it is the moduli that relax, from the first sample on, and no stress is left
-    when the specimen is back at its first length. Tissue is seen to follow either. The energy's moduli are
+    when the specimen is back at its first length. Tissue is seen to follow either; the parameter `moduli` leads from
+    the one (0) to the other (1) in between. The energy's moduli are
     INSTANTANEOUS ones; the long-term stress is (1 - sum_i g_i) of it (`long_term`). A recording starts from rested
     tissue. `terms` relaxation times lie, to start with, in equal parts of the decades from `shortest` to `longest`
     seconds.
@@ -61,12 +62,16 @@ class Viscoelasticity(Effect):
     def parameters(self) -> tuple[Parameter, ...]:
         edges = np.geomspace(self.shortest, self.longest, self.terms + 1)
         times = np.sqrt(edges[:-1] * edges[1:])
-        return tuple(
-            Parameter(f"g{i}", "1", 0.0, lower=0.0, upper=1.0, scale=0.1, meaning=f"share that relaxes with tau{i}")
-            for i in self._numbers
-        ) + tuple(
-            Parameter(f"tau{i}", "s", float(t), lower=1e-4, upper=1e7, meaning=f"relaxation time {i}")
-            for i, t in zip(self._numbers, times)
+        return (
+            tuple(
+                Parameter(f"g{i}", "1", 0.0, lower=0.0, upper=1.0, scale=0.1, meaning=f"share that relaxes with tau{i}")
+                for i in self._numbers
+            )
+            + tuple(
+                Parameter(f"tau{i}", "s", float(t), lower=1e-4, upper=1e7, meaning=f"relaxation time {i}")
+                for i, t in zip(self._numbers, times)
+            )
+            + (Parameter("moduli", "1", float(self.moduli), 0.0, 1.0, "share of the moduli's law", frozen=True),)
         )
 
     @property
@@ -78,20 +83,17 @@ class Viscoelasticity(Effect):
         return 1 - sum(p[f"g{i}"] for i in self._numbers)
 
     def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:
-        inverse = state.inverse
+        inverse, share = state.inverse, p.get("moduli", float(self.moduli))
         s = state.stacked()
-        if self.moduli:
-            s = s + state.spherical[:, None] * inverse
+        seen = s + share * state.spherical[:, None] * inverse
         g = jnp.stack([jnp.asarray(p[f"g{i}"]) for i in self._numbers])
         tau = jnp.stack([jnp.asarray(p[f"tau{i}"]) for i in self._numbers])
-        h = jax.vmap(lambda t: fading(test.time, s, t))(tau)
-        if not self.moduli:
-            return state.replaced(s - jnp.tensordot(g, s - h, 1))
-        h = h + jnp.exp(-test.elapsed[:, None] / tau[:, None, None]) * s[0]  # moduli are there before any strain
-        lost = jnp.tensordot(g, s - h, 1)
+        h = jax.vmap(lambda t: fading(test.time, seen, t))(tau)
+        h = h + share * jnp.exp(-test.elapsed[:, None] / tau[:, None, None]) * seen[0]  # moduli are there before strain
+        lost = jnp.tensordot(g, seen - h, 1)
         C = jnp.stack([state.C.xx, state.C.yy, state.C.zz, 2 * state.C.xy], -1)
-        lost = lost - jnp.sum(lost * C, -1, keepdims=True) / 3 * inverse
-        return state.replaced(state.stacked() - lost)
+        lost = lost - share * jnp.sum(lost * C, -1, keepdims=True) / 3 * inverse
+        return state.replaced(s - lost)
 
     def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
         g = jnp.stack([jnp.asarray(p[f"g{i}"]) for i in self._numbers])
