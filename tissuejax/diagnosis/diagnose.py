@@ -11,7 +11,7 @@ import numpy as np
 from tissuejax.cache import keep_programs
 from tissuejax.diagnosis.decide import decide
 from tissuejax.diagnosis.material import MaterialBench
-from tissuejax.diagnosis.next_experiment import proposals
+from tissuejax.diagnosis.next_experiment import proposals, settling
 from tissuejax.diagnosis.next_probing import probing_proposals
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_map import stiffness_maps
@@ -85,12 +85,10 @@ def diagnose(
         look = search_probing if kind == "probing" else search
         found = look(bench, budget, lambda note: stage.advance(note=note))
     verdict = decide(found)
-    ideas = []
-    for rival in verdict.rivals[:2]:
-        if kind == "homogeneous":
-            ideas += proposals(sample, base, bench, verdict.chosen, rival)
-        elif not ideas:  # each planned press is a simulation
-            ideas += probing_proposals(sample, bench, verdict.chosen, rival)
+    if kind == "homogeneous":
+        ideas = settling([proposals(sample, base, bench, verdict.chosen, r, None) for r in verdict.rivals[:3]])
+    else:  # each planned press is a simulation
+        ideas = settling([probing_proposals(sample, bench, verdict.chosen, r, None) for r in verdict.rivals[:1]])
     maps = []
     if kind == "probing" and verdict.kind != "nothing-missing":
         maps = stiffness_maps(bench, found.empty.values, found.empty.prediction)

@@ -85,6 +85,7 @@ def protocols(sample: Sample) -> dict[str, Recording]:
     rate = max(float(np.median(rates)) / dt, 1e-4)
     last = max(float(r.attributes.get("start", 0.0)) for r in sample.recordings.values())
     deep = min(low, 0.8)
+    taller = {"height": 2 * float(first.attributes.get("height", 0.01))}
     known = {k: v for k, v in first.attributes.items() if k in ("area", "height", "diameter", "direction")}
 
     def made(name: str, kind: str, path: tuple[np.ndarray, np.ndarray], **other) -> Recording:
@@ -126,20 +127,17 @@ def protocols(sample: Sample) -> dict[str, Recording]:
             ramp([high, 1.0], rate, [5.0, 2.0]),
             {"start": last + 86400.0},
         ),
-        "a specimen of twice the height": (
-            "uniaxial",
-            ramp([high, deep, 1.0], rate, [0.0, 0.0, 2.0]),
-            {"height": 2 * float(first.attributes.get("height", 0.01))},
-        ),
+        "the same pull of a specimen of twice the height": ("uniaxial", ramp([high, 1.0], rate, [0.0, 2.0]), taller),
+        "a push of a specimen of twice the height": ("uniaxial", ramp([deep, 1.0], rate, [0.0, 2.0]), taller),
         "sixty seconds at rest": ("uniaxial", ramp([1.0], rate, [60.0]), {}),
     }
     return {text: made(f"p{i}", kind, path, **other) for i, (text, (kind, path, other)) in enumerate(words.items())}
 
 
 def proposals(
-    sample: Sample, energy: Energy, bench: MaterialBench, chosen: Refit, rival: Refit, most: int = 3
+    sample: Sample, energy: Energy, bench: MaterialBench, chosen: Refit, rival: Refit, most: int | None = 3
 ) -> list[Proposal]:
-    """The protocols that tell `chosen` from `rival` best.
+    """The protocols that tell `chosen` from `rival` best (all of them for None).
 
     Args:
         sample: what was recorded, to vary.
@@ -166,6 +164,19 @@ def proposals(
             continue
         sides = [against(d, o / scale, n[s.rows] / sigma) for o, n in zip(old, new, strict=True)]
         out.append(Proposal(text, (names[0], names[1]), min(sides), planned[text]))
+    return sorted(out, key=lambda p: -p.discrimination)[:most]
+
+
+def settling(each: list[list[Proposal]], most: int = 3) -> list[Proposal]:
+    """Of the proposals against each rival, the protocols that tell the chosen explanation from all of them best."""
+    if not each:
+        return []
+    out = []
+    for p in each[0]:
+        same = [next((q for q in other if q.protocol == p.protocol), None) for other in each]
+        if all(same):
+            rivals = " or ".join(dict.fromkeys(q.between[1] for q in same))
+            out.append(replace(p, between=(p.between[0], rivals), discrimination=min(q.discrimination for q in same)))
     return sorted(out, key=lambda p: -p.discrimination)[:most]
 
 

@@ -69,7 +69,7 @@ def _planned(r: Recording, name: str, time: np.ndarray, path: np.ndarray) -> Rec
 
 
 def probing_proposals(
-    sample: Sample, bench: ProbingBench, chosen: Refit, rival: Refit, most: int = 3
+    sample: Sample, bench: ProbingBench, chosen: Refit, rival: Refit, most: int | None = 3
 ) -> list[Proposal]:
     """The presses that tell `chosen` from `rival` best, from those of `presses` for the first fitted recording."""
     name = bench.fitted[0]

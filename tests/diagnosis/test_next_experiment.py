@@ -1,0 +1,72 @@
+"""The next experiment: what counts as telling apart, and fibres told from a stiffer energy by a pull across them."""
+
+import numpy as np
+import pytest
+
+from tissuejax.diagnosis.material import MaterialBench
+from tissuejax.diagnosis.misfit import white
+from tissuejax.diagnosis.next_experiment import Proposal, against, proposals, protocols, settling
+from tissuejax.diagnosis.refit import refit
+from tissuejax.energies.catalogue import energy
+from tissuejax.recordings.recording import Channel, Recording, Sample
+
+
+def test_what_a_parameter_can_absorb_tells_nothing_apart(rng):
+    old, new = rng.normal(size=(40, 2)), rng.normal(size=(30, 2))
+    moved = new @ [0.3, -0.2]
+    assert against(moved, 1e-9 * old, new) < 1e-6, "the old recordings leave the parameters free"
+    fixed = against(moved, 1e6 * old, new)
+    assert fixed == pytest.approx(moved @ moved, rel=1e-6), "the old recordings hold them"
+
+
+def test_a_protocol_has_to_tell_the_chosen_one_from_every_rival():
+    def made(text, rival, size):
+        return Proposal(text, ("a", rival), size, None)
+
+    each = [
+        [made("hold", "b", 50.0), made("faster", "b", 20.0), made("planar", "b", 30.0)],
+        [made("hold", "c", 1.0), made("faster", "c", 25.0)],
+    ]
+    found = settling(each)
+    assert [(p.protocol, p.discrimination) for p in found] == [("faster", 20.0), ("hold", 1.0)]
+    assert found[0].between == ("a", "b or c")
+    assert settling([]) == []
+
+
+MU, K1 = 900.0, 300.0
+
+
+@pytest.fixture(scope="module")
+def pulled():
+    """A pull along fibres, closed form: P = mu (l - l^-2) + 2 l k1 E exp(E^2), E = l^2 - 1."""
+    time = np.linspace(0, 12, 150)
+    l = np.interp(time, [0, 1, 6, 11], [1, 1, 1.25, 1])
+    inputs, E = {"time": time, "stretch": l}, l**2 - 1
+    noise = 5 * np.random.default_rng(3).standard_normal(len(l))
+    channel = Channel(time, MU * (l - l**-2) + 2 * l * K1 * E * np.exp(E**2) + noise, "Pa", 5.0)
+    sizes = {"area": 5e-4, "height": 0.025, "start": 0.0}
+    return Sample("s", {"pull": Recording("pull", "uniaxial", inputs, {"nominal_stress": channel}, sizes)})
+
+
+def test_a_pull_across_tells_fibres_along_the_pull_from_a_stiffer_energy(pulled):
+    """Along the fibres both raise the force; across them only the energy does."""
+    law = energy("neo-hookean")
+    bench = MaterialBench.of(pulled, law, ("pull",), (), {"pull": 5.0}, ["anisotropy", "energy-form"])
+    start = {"effects.anisotropy.k1": 100.0, "effects.anisotropy.angle": 0.1, "effects.anisotropy.k2": 1.0}
+    fibres = refit(bench, white(bench), ("anisotropy/in the xy plane",), start)
+    form = refit(bench, white(bench), ("energy-form/all",), {"effects.energy-form.C30": 100.0})
+    for fit in (fibres, form):
+        assert fit.chi2 / fit.n < 1.5, "both have to explain the pull"
+    found = proposals(pulled, law, bench, fibres, form, None)
+    told = {p.protocol: p.discrimination for p in found}
+    assert told["the same pull along the sample's y axis"] > 30
+    assert told["the first recording again a day later"] < 3
+    assert told["sixty seconds at rest"] < 1e-3
+
+
+def test_protocols_stay_near_what_was_done(pulled):
+    made = protocols(pulled)
+    assert len(made) >= 12
+    for r in made.values():
+        assert 0.6 < np.min(r.inputs["stretch"]) <= np.max(r.inputs["stretch"]) < 1.4
+        assert r.attributes["start"] >= 600
