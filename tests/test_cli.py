@@ -150,3 +150,16 @@ def test_an_empty_file_is_refused(tmp_path, capsys):
     empty.touch()
     assert main(["fit", str(empty), *YEOH]) == 2
     assert "empty file" in capsys.readouterr().err
+
+
+def test_the_demo_fits_fails_to_fit_and_finds_out_why(capsys, tmp_path):
+    code, record = answer(capsys, "demo", "--out", str(tmp_path))
+    assert code == 0
+    assert record["elastic"]["holdout"]["holdout/nominal_stress"]["chi2_per_sample"] < 1.2
+    assert record["relaxing"]["holdout"]["holdout/nominal_stress"]["chi2_per_sample"] > 100
+    found = record["diagnosis"]
+    assert found["verdict"] == "found"
+    assert [e["name"] for e in found["effects"]] == ["viscoelasticity"]
+    assert found["after"]["holdout"]["nominal_stress"]["chi2_per_sample"] < 1.2
+    for name in ("elastic", "relaxing", "diagnosis"):
+        assert (tmp_path / name / "report.html").stat().st_size > 50_000

@@ -1,0 +1,36 @@
+"""Porcine skin, diagnosed: the base model is isotropic; each of the five biaxial paths is held out in turn.
+
+The tables hold no time, so that nothing that acts in time is tried.
+
+tissuejax study fits/porcine-skin
+"""
+
+from pathlib import Path
+
+import tissuejax as tj
+from tissuejax.diagnosis.specimens import Specimens, brief
+from tissuejax.progress import for_terminal
+from tissuejax.report.page import write_figures
+from tissuejax.storage import write_json
+
+ENERGIES = ("demiray",)
+SHOWN = ("demiray", "off_y")
+
+
+def main(folder: Path) -> str:
+    """Every path held out once, for two base energies; returns the answer in a sentence."""
+    sample, records = tj.read(folder / "skin.toml"), {}
+    for energy in ENERGIES:
+        for path in sample.recordings:
+            found = tj.diagnose(sample, energy, holdout=path, progress=for_terminal())
+            records[f"{energy}, without {path}"] = brief(found)
+            if (energy, path) == SHOWN:
+                tj.write(found, folder / "figures" / "diagnosis")
+    many = Specimens(records)
+    write_figures(many, folder / "figures")
+    write_json(folder / "diagnosis.json", many.as_dict())
+    return f"{many.verdicts}; found in {many.counts} of {len(records)}"
+
+
+if __name__ == "__main__":
+    print(main(Path(__file__).parent))
