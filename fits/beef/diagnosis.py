@@ -16,6 +16,7 @@ from tissuejax.diagnosis.transfer import transfer
 from tissuejax.energies.catalogue import energy
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read_all
+from tissuejax.report.diagnosis_page import write_diagnosis
 from tissuejax.report.page import png, write_figures
 from tissuejax.report.plot import FAINT, HELD, INK, grid
 from tissuejax.storage import write_bytes, write_json
@@ -77,7 +78,7 @@ def main(folder: Path) -> str:
         found = tj.diagnose(samples[name], ENERGY, progress=for_terminal())
         records[name] = brief(found)
         if name == SHOWN:
-            tj.write(found, folder / "figures" / name)
+            write_diagnosis(found, folder / "figures" / name, remainders=False)
     many = Specimens(records)
     shared, others = carried(samples, discovery)
     write_figures(many, folder / "figures")

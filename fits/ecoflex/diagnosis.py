@@ -16,6 +16,7 @@ from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read_all
 from tissuejax.recordings.recording import Channel, Recording, Sample
+from tissuejax.report.diagnosis_page import write_diagnosis
 from tissuejax.report.page import write_figures
 from tissuejax.storage import write_json
 
@@ -54,7 +55,7 @@ def main(folder: Path) -> str:
         found = tj.diagnose(sample, ENERGY, progress=for_terminal())
         records[name] = brief(found) | {"noise_Pa": noise, "recordings": list(sample.recordings)}
         if name == SHOWN:
-            tj.write(found, folder / "figures" / "diagnosis")
+            write_diagnosis(found, folder / "figures" / "diagnosis", remainders=False)
     many = Specimens(records)
     write_figures(many, folder / "figures")
     write_json(folder / "diagnosis.json", many.as_dict())

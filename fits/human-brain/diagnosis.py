@@ -10,6 +10,7 @@ from pathlib import Path
 import tissuejax as tj
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.progress import for_terminal
+from tissuejax.report.diagnosis_page import write_diagnosis
 from tissuejax.report.page import write_figures
 from tissuejax.storage import write_json
 
@@ -26,7 +27,7 @@ def main(folder: Path) -> str:
         found = tj.diagnose(sample, ENERGY, holdout=HELD, effects=TRIED, progress=for_terminal())
         records[words] = brief(found)
         if region == "CX":
-            tj.write(found, folder / "figures" / "diagnosis")
+            write_diagnosis(found, folder / "figures" / "diagnosis", remainders=False)
     many = Specimens(records)
     write_figures(many, folder / "figures")
     write_json(folder / "diagnosis.json", {"tried": list(TRIED), "held_out": HELD, **many.as_dict()})

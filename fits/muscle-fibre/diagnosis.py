@@ -15,6 +15,7 @@ from tissuejax.diagnosis.transfer import transfer
 from tissuejax.energies.catalogue import energy
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.recording import Channel, Sample
+from tissuejax.report.diagnosis_page import write_diagnosis
 from tissuejax.report.page import write_figures
 from tissuejax.storage import write_json
 
@@ -39,7 +40,7 @@ def main(folder: Path) -> str:
         found[state] = (sample, tj.diagnose(sample, ENERGY, holdout=HELD, progress=for_terminal()))
         records[state] = brief(found[state][1])
         if state == STATES[0]:
-            tj.write(found[state][1], folder / "figures" / "diagnosis")
+            write_diagnosis(found[state][1], folder / "figures" / "diagnosis", remainders=False)
     many = Specimens(records)
     write_figures(many, folder / "figures")
     first = found[STATES[0]][1].verdict.chosen.values

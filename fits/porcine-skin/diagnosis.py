@@ -10,6 +10,7 @@ from pathlib import Path
 import tissuejax as tj
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.progress import for_terminal
+from tissuejax.report.diagnosis_page import write_diagnosis
 from tissuejax.report.page import write_figures
 from tissuejax.storage import write_json
 
@@ -25,7 +26,7 @@ def main(folder: Path) -> str:
             found = tj.diagnose(sample, energy, holdout=path, progress=for_terminal())
             records[f"{energy}, without {path}"] = brief(found)
             if (energy, path) == SHOWN:
-                tj.write(found, folder / "figures" / "diagnosis")
+                write_diagnosis(found, folder / "figures" / "diagnosis", remainders=False)
     many = Specimens(records)
     write_figures(many, folder / "figures")
     write_json(folder / "diagnosis.json", many.as_dict())

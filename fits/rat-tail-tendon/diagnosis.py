@@ -18,6 +18,7 @@ from tissuejax.energies.catalogue import energy
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read_all
 from tissuejax.recordings.recording import Channel, Sample
+from tissuejax.report.diagnosis_page import write_diagnosis
 from tissuejax.report.page import write_figures
 from tissuejax.storage import write_json
 
@@ -47,7 +48,7 @@ def main(folder: Path) -> str:
         found = tj.diagnose(sample, ENERGY, progress=for_terminal())
         records[name] = brief(found)
         if name == SHOWN:
-            tj.write(found, folder / "figures" / "diagnosis")
+            write_diagnosis(found, folder / "figures" / "diagnosis", remainders=False)
             relaxation = {p: v for p, v in found.verdict.chosen.values.items() if ".viscoelasticity." in p}
     many = Specimens(records)
     write_figures(many, folder / "figures")

@@ -16,6 +16,7 @@ import tissuejax as tj
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.recording import Channel, Sample
+from tissuejax.report.diagnosis_page import write_diagnosis
 from tissuejax.report.page import write_figures
 from tissuejax.storage import write_json
 
@@ -53,7 +54,11 @@ def main(folder: Path) -> str:
             found = tj.diagnose(sample, energy, holdout=HELD, ogden_form=form, progress=for_terminal())
             records[f"{source}, {energy}, {words.split(', ')[1]}"] = brief(found) | {"energy": words.split(",")[0]}
             if source == "Meunier_2008":
-                tj.write(found, folder / "figures" / f"diagnosis-{words.replace(', ', '-').replace(' ', '-')}")
+                write_diagnosis(
+                    found,
+                    folder / "figures" / f"diagnosis-{words.replace(', ', '-').replace(' ', '-')}",
+                    remainders=False,
+                )
     many = Specimens(records)
     write_figures(many, folder / "figures")
     write_json(folder / "diagnosis.json", {"held_out": HELD, "spread": SPREAD, **many.as_dict()})

@@ -8,18 +8,22 @@ from tissuejax.report.page import figures, render
 from tissuejax.storage import write_bytes, write_json, write_text
 
 
-def write_diagnosis(found: Diagnosis, out: Path) -> dict[str, Path]:
+def write_diagnosis(found: Diagnosis, out: Path, remainders: bool = True) -> dict[str, Path]:
     """result.json, remainder.json, report.html and one PNG a figure, each written whole or not at all.
+
+    Args:
+        found: the diagnosis.
+        out: folder, made if missing.
+        remainders: False leaves remainder.json out, which holds the residual sample by sample.
 
     Returns:
         Paths by name: "result", "remainder", "page" and the figures.
     """
     out = Path(out)
     record = found.as_dict()
-    written = {
-        "result": write_json(out / "result.json", record),
-        "remainder": write_json(out / "remainder.json", found.remainders()),
-    }
+    written = {"result": write_json(out / "result.json", record)}
+    if remainders:
+        written["remainder"] = write_json(out / "remainder.json", found.remainders())
     drawn = figures(found)
     written |= {f["name"]: write_bytes(out / f"{f['name']}.png", f["png"]) for f in drawn}
     page = render(
