@@ -1,9 +1,6 @@
 """A small fixed part of the challenge, run on every change: blunting the diagnosis turns this red."""
 
-import importlib.util
 import json
-
-import pytest
 
 from tissuejax.challenge import files
 from tissuejax.challenge.material_cases import draw
@@ -11,24 +8,19 @@ from tissuejax.challenge.run import answer
 from tissuejax.challenge.verdicts import mark
 
 SEED = 314
-# Sizes 5 to 15 and laws like the catalogue's. One case was swapped after it had been seen: aging in a straight line
-# (number 12), answered "drift + aging" with 5.7 times the held-out error of the truth: a fault of the diagnosis, which
-# the whole challenge measures and this part does not.
+# Sizes 5 to 15. All but one have laws like the catalogue's; "aging" runs straight in time, which the diagnosis once
+# called drift and aging, until its aging could do so too.
 CASES = {  # name: (number, category, which effect or stray comes first)
     "nothing": (0, "none", 0),  # correlated noise
-    "nothing-else": (1, "none", 1),
     "viscoelasticity": (13, "one", 0),
     "softening": (11, "one", 1),
     "slack": (30, "one", 10),
-    "aging": (23, "one", 6),
+    "aging": (12, "one", 6),
     "drift": (11, "one", 7),
     "warmed": (11, "unknown", 3),
 }
 
 
-@pytest.mark.skipif(
-    importlib.util.find_spec("tissuejax.diagnosis.diagnose") is None, reason="there is no diagnosis yet"
-)
 def test_fixed_cases(tmp_path):
     marks = []
     for name, (number, kind, turn) in CASES.items():

@@ -1,10 +1,15 @@
 """Rivals read off a result, and the Gaussian process, on answers and data made by hand."""
 
+import json
+
 import numpy as np
 import pytest
 
 from tissuejax.challenge import files, rivals
+from tissuejax.challenge.compare import compare
+from tissuejax.challenge.make import make
 from tissuejax.challenge.material_cases import draw
+from tissuejax.storage import write_json
 
 RESULT = {
     "candidates": [
@@ -64,3 +69,27 @@ def test_gaussian_process_learns_a_drift(tmp_path):
     assert noise == pytest.approx(case.noise)
     assert np.array_equal(stress["r1"], case.stress["r1"])
     assert [t.name for t in trials] == [t.name for t in case.trials]
+
+
+def test_rivals_are_marked_like_the_diagnosis(tmp_path):
+    make(tmp_path, count=3, seed=5)
+    keys = json.loads((tmp_path / "sealed" / "keys.json").read_text())
+    for name, key in keys.items():
+        answer = RESULT | {
+            "verdict": "found",
+            "effects": [{"name": n} for n in key["effects"]],
+            "after": {key["held_out"]: {"nominal_stress": {"chi2_per_sample": 1.0}}},
+        }
+        write_json(tmp_path / "results" / name / "result.json", answer)
+        write_json(tmp_path / "results" / name / "cost.json", {"seconds": 2.0})
+    found = compare(tmp_path, every=len(keys))
+    ours, subsets = (found["rivals"][w] for w in ("diagnosis", "information criterion over all sets refitted"))
+    single = "single above 3 noise: right and no other"
+    assert ours[single]["share"] in (1.0, None)
+    assert ours["seconds"]["median"] == 2.0
+    # every rival names something in every case: a false alarm wherever there is nothing
+    assert subsets["nulls: false alarm"]["share"] in (1.0, None)
+    ratios = [np.sqrt(1.1) / key["truth_error_over_noise"][key["held_out"]] for key in keys.values()]
+    known = [r for r, key in zip(ratios, keys.values()) if key["category"] != "unknown"]
+    assert subsets["held_out_error_over_truth"]["median"] == pytest.approx(np.median(known))
+    assert (tmp_path / "rivals.csv").read_text().count("\n") == 7
