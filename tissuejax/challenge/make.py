@@ -25,6 +25,9 @@ def make(
 ) -> dict:
     """Make `count` cases and return the manifest.
 
+    A case depends on the seed and its own number alone: a folder with fewer cases of the same seed is filled up, and
+    the results that it has stay valid.
+
     Args:
         out: folder of the challenge.
         kind: "material" or "probing".
@@ -43,9 +46,12 @@ def make(
     plan = {"version": 1, "kind": kind, "count": count, "seed": seed}
     if (out / "manifest.json").exists():
         manifest = files.read_manifest(out)
-        if {k: manifest[k] for k in plan} != plan:
+        if {k: manifest[k] for k in plan} == plan:
+            return manifest
+        if {k: manifest[k] for k in plan if k != "count"} != {k: v for k, v in plan.items() if k != "count"}:
             raise InputError(f"{out} holds another challenge already; name an empty folder, or remove that one")
-        return manifest
+        if manifest["count"] > count:
+            raise InputError(f"{out} holds {manifest['count']} cases of this seed already; ask for as many or more")
     case = partial(_material, out, seed) if kind == "material" else partial(_probing, out, seed)
     entries, keys = {}, {}
     with (progress or Silent()).stage(f"making {count} {kind} cases", total=count) as stage:

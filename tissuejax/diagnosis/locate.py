@@ -14,6 +14,7 @@ from scipy.ndimage import uniform_filter1d
 from tissuejax.diagnosis.bench import Bench, Segment
 from tissuejax.diagnosis.periodogram import periodogram
 
+CYCLES = 2.0  # fewer periods in a recording are no period: any single press looks like one
 PHASES = ("rest", "loading", "hold", "unloading")
 
 
@@ -189,7 +190,8 @@ def _period(segments: list[Segment], z: np.ndarray) -> Iterable[Located]:
         return
     best = int(np.argmax(power))
     share = float((power[best] - 2 * len(segments)) / (whole - n))
-    if share > 0.5:
+    cycles = frequencies[best] * max(s.time[-1] - s.time[0] for s in segments)
+    if share > 0.5 and cycles >= CYCLES:
         period = 1 / frequencies[best]
         what = f"a period of {period:.3g} s ({frequencies[best]:.3g} Hz)"
         details = {"period": float(period), "frequency": float(frequencies[best]), "unit": "s"}

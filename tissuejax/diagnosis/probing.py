@@ -133,7 +133,10 @@ class ProbingBench(Bench):
         """See `Bench.jacobian`."""
         wanted = tuple(recordings or (*self.fitted, *self.held_out))
         at = {**{p: self.start[p] for p in paths}, **self.at(values)}
-        return self._columns([(at, p, self._step(p, at[p]), wanted) for p in paths])
+        here = self._near(at) if "effects.inclusion.x" in at else ()
+        here = tuple(n for n in wanted if n in here) or wanted
+        felt = {p: here if p.startswith("effects.inclusion.") else wanted for p in paths}
+        return self._columns([(at, p, self._step(p, at[p]), felt[p]) for p in paths])
 
     def columns(
         self, values: Mapping[str, float], settings: Sequence[tuple[Mapping[str, float], str]]

@@ -1,4 +1,8 @@
-"""Candidates of probings: the effects in their forms, with priors on what a careful experimenter misjudges at most."""
+"""Candidates of probings: the effects in their forms, with priors on what a careful experimenter misjudges at most.
+
+Gravity is not among them. Its size is known (9.81 m/s^2): it is nothing to be found but something to be told, a model
+with the effect `gravity` fixed at that value. As a candidate it would cost a stress-free shape for every run.
+"""
 
 import numpy as np
 from jaxtyping import Float

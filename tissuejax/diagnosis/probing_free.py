@@ -11,6 +11,7 @@ with slopes s_i = dy/dc_i of everything measured by the probe's place,
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+import equinox as eqx
 import numpy as np
 
 from tissuejax.diagnosis.probing_runs import COARSE
@@ -34,7 +35,7 @@ MOVERS = {
     "effects.contact-offset.depth",
     "effects.contact-offset.delay",
     "effects.machine-compliance.compliance",
-    *(f"effects.periodic.{w}" for w in ("sin", "cos", "sin2", "cos2")),
+    *(f"effects.periodic.{w}" for w in ("sin", "cos", "sin2", "cos2", "lean_x", "lean_y", "frequency")),
 }
 
 
@@ -61,7 +62,7 @@ def _amplitude(bench: "ProbingBench", path: str) -> bool:
 
 
 def _axes(path: str) -> str:
-    return {"dx": "x", "dy": "y", "depth": "z"}.get(path.split(".")[2], "xyz")
+    return {"dx": "x", "dy": "y", "depth": "z", "lean_x": "x", "lean_y": "y"}.get(path.split(".")[2], "xyz")
 
 
 def _own(path: str, wanted: tuple[str, ...]) -> tuple[str, ...]:
@@ -83,7 +84,7 @@ def _shifted(at: Mapping[str, float], path: str, h: float, own: tuple[str, ...])
 
 def moving(bench: "ProbingBench", at: Mapping[str, float], path: str, wanted: tuple[str, ...]) -> np.ndarray:
     """Derivative by a parameter that moves probe or support."""
-    own, name = _own(path, wanted), path.split(".")[2]
+    own = _own(path, wanted)
     origin = bench.runs.many([(at, own, COARSE)])[0]
     slope = {}
     for axis in _axes(path):
@@ -97,8 +98,9 @@ def moving(bench: "ProbingBench", at: Mapping[str, float], path: str, wanted: tu
             if s.recording == r:
                 for axis, way in motion.items():
                     out[s.rows] += slope[axis][s.rows] * way(s.time)
-                if name.startswith(("sin", "cos")) and s.channel == "markers":
-                    out[s.rows] -= motion[s.component[-1]](s.time) - _calm(bench, r, motion[s.component[-1]])
+                way = motion.get(s.component[-1])
+                if path.startswith("effects.periodic.") and s.channel == "markers" and way is not None:
+                    out[s.rows] -= way(s.time) - _calm(bench, r, way)
     return out
 
 
@@ -109,10 +111,20 @@ def _calm(bench: "ProbingBench", recording: str, way) -> float:
     return float(weights @ way(np.asarray(setup.scene.clock.ends, float))) if weights.sum() > 0 else 0.0
 
 
-def _wave(at: Mapping[str, float], path: str, time: np.ndarray) -> np.ndarray:
-    name = path.split(".")[2]
+def _wave(at: Mapping[str, float], name: str, time: np.ndarray) -> np.ndarray:
     angle = 2 * np.pi * at["effects.periodic.frequency"] * time * (2 if name.endswith("2") else 1)
     return np.sin(angle) if name.startswith("sin") else np.cos(angle)
+
+
+def _lift(at: Mapping[str, float], recording: str, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The support's lift and its derivative by the frequency."""
+    out, slope = np.zeros(len(time)), np.zeros(len(time))
+    turned = {"sin": ("cos", 1), "cos": ("sin", -1), "sin2": ("cos2", 2), "cos2": ("sin2", -2)}
+    for name, (other, factor) in turned.items():
+        a = at.get(f"effects.periodic.{name}.{recording}", at.get(f"effects.periodic.{name}", 0.0))
+        out += a * _wave(at, name, time)
+        slope += a * factor * 2 * np.pi * time * _wave(at, other, time)
+    return out, slope
 
 
 def _motion(bench: "ProbingBench", at: Mapping[str, float], path: str, recording: str, origin: np.ndarray) -> dict:
@@ -123,8 +135,12 @@ def _motion(bench: "ProbingBench", at: Mapping[str, float], path: str, recording
     if name == "depth":
         return {"z": lambda t: -np.ones_like(t)}
     if path.startswith("effects.periodic."):
+        if name.startswith("lean"):
+            return {name[-1]: lambda t: -_lift(at, recording, t)[0]}
         lean = {c: at.get(f"effects.periodic.lean_{c}", 0.0) for c in "xy"} | {"z": 1.0}
-        return {c: (lambda t, k=k: -k * _wave(at, path, t)) for c, k in lean.items()}
+        if name == "frequency":
+            return {c: (lambda t, k=k: -k * _lift(at, recording, t)[1]) for c, k in lean.items()}
+        return {c: (lambda t, k=k: -k * _wave(at, name, t)) for c, k in lean.items()}
     if name == "delay":
         time, place = smooth_path(bench.ready.sample.recordings[recording], bench.ready.settings.smoothing)
         rate = np.gradient(place, time, axis=0)
@@ -161,8 +177,10 @@ def _told(bench: "ProbingBench", effect: Effect, values: Mapping[str, float], na
     for d in effect.parameters:
         generic = f"effects.{effect.name}.{d.name}"
         p[d.name] = values.get(f"{generic}.{name}", values.get(generic, effect.neutral[d.name]))
-    out = {}
-    for channel, ch in effect.channels(p, bench.ready.setups[name].test, channels).items():
+    out, test = {}, bench.ready.setups[name].test
+    shown = channels["markers"].values.shape[1] if "markers" in channels else 0
+    test = eqx.tree_at(lambda t: t.rest, test, test.rest[:shown])  # without the padding of the simulation
+    for channel, ch in effect.channels(p, test, channels).items():
         t = np.asarray(measured[channel].time, float)
         flat = np.asarray(ch.values, float).reshape(len(t), -1)
         read = np.stack([np.interp(t, np.asarray(ch.time), flat[:, i]) for i in range(flat.shape[1])], axis=1)

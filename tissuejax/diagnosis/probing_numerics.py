@@ -1,8 +1,9 @@
 """Is it the simulation and not the tissue? The prediction again with mesh, step and penalty changed.
 
-From the change to the next setting the distance to the limit follows by the order of convergence. If these three
-changes (each with an amplitude of about one, together with the base's own parameters) take up the misfit, what the
-model lacks is resolution, and no effect may be named.
+From the change between two settings the distance of the better one to the limit follows by the order of convergence
+(mesh: square of the spacing, step: square of the compression, penalty: its inverse), so the cheap simulations tell of
+the errors of the dear one. If these three (each with an amplitude of about one, together with the base's own
+parameters) take up the misfit, what the model lacks is resolution, and no effect may be named.
 """
 
 from dataclasses import dataclass
@@ -11,11 +12,10 @@ import numpy as np
 
 from tissuejax.diagnosis.misfit import Misfit
 from tissuejax.diagnosis.probing import ProbingBench
-from tissuejax.diagnosis.probing_runs import FINE
+from tissuejax.diagnosis.probing_runs import COARSE, FINE
 from tissuejax.diagnosis.quality import TOLERATED
 from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.score import complement, gain
-from tissuejax.fitting.probed import REMAINS
 
 MOSTLY = 0.6  # share of the misfit that has to be numerical before nothing else is looked for
 MOST = 1.5  # of the estimated distance to the limit: farther off, it is no numerical error
@@ -55,11 +55,18 @@ class Numerics:
 def numerics(bench: ProbingBench, misfit: Misfit, at: Refit) -> Numerics:
     """The numerical error at a fit, from three more predictions of the fitted recordings."""
     names, ready = bench.fitted, bench.runs.ready
-    for choice, settings in ready[FINE].settings.varied.items():
+    fine, rough = ready[FINE].settings, ready[COARSE].settings
+    finer = fine.counts[0] / rough.counts[0]
+    varied = {
+        "mesh": (rough.changed(counts=fine.counts), 1 / (finer**2 - 1)),
+        "step": (rough.changed(compression=fine.compression), 1 / ((rough.compression / fine.compression) ** 2 - 1)),
+        "penalty": (rough.changed(penalty=2 * rough.penalty), 2.0),
+    }
+    for choice, (settings, _) in varied.items():
         if choice not in ready:
-            ready[choice] = ready[FINE].with_settings(settings)
-    told = bench.runs.many([(bench.at(at.values), names, kind) for kind in (FINE, *REMAINS)])
-    changes = {choice: REMAINS[choice] * (p - told[0]) for choice, p in zip(REMAINS, told[1:], strict=True)}
+            ready[choice] = ready[COARSE].with_settings(settings)
+    told = bench.runs.many([(bench.at(at.values), names, kind) for kind in (COARSE, *varied)])
+    changes = {c: remains * (p - told[0]) for (c, (_, remains)), p in zip(varied.items(), told[1:], strict=True)}
     rms: dict[str, dict[str, float]] = {}
     for choice, d in changes.items():
         for channel in dict.fromkeys(s.channel for s in bench.segments):

@@ -1,8 +1,9 @@
 """The search where every prediction is a simulation: score, try one step, refit those that keep their promise.
 
 A linear score ranks by what a small change would do; far from the truth (an inclusion five times as stiff) it ranks
-poorly. So the best few candidates take one real step, from the derivatives that the score has computed already, at the
-price of one or two predictions each. Only those whose step did about as well as the best one are refitted to the end.
+poorly. So the best few candidates take one real step on the cheap mesh, from the derivatives that the score has
+computed already, at the price of one or two predictions each. Only those whose step did about as well as the best one
+are refitted to the end, on the mesh that counts.
 """
 
 import math
@@ -22,7 +23,8 @@ from tissuejax.diagnosis.search import Budget, Search
 from tissuejax.errors import NotConverged
 
 BUDGET = Budget(most=2, beam=(1, 1), nominees=(3, 2), share=0.03, starts=1, iterations=8, tolerance=20.0)
-TRIED = 6  # candidates that take a step
+TRIED = 5  # candidates that take a step
+PROMISING = 0.1  # of the best score: the least for a step
 RIVALS = 0.6  # of the best step's gain: the least for a refit
 CLOSE = 0.85  # the same, once one refit leaves nothing but noise
 
@@ -78,10 +80,12 @@ def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
         if math.isfinite(trial.chi2):
             trials.append((trial.chi2, score.key, trial))
     trials.sort(key=lambda t: t[0])
+    before = s.misfit.residual(s.bench.runs.many([(parent.values, s.bench.fitted, COARSE)])[0], s.bench.fitted)
+    whole = float(before @ before)
     grown: list[frozenset] = []
     for chi2, key, trial in trials[:most]:
         done = any(quality(s, s.refits[k]).noise for k in grown)
-        if parent.chi2 - chi2 < (CLOSE if done else RIVALS) * (parent.chi2 - trials[0][0]):
+        if whole - chi2 < (CLOSE if done else RIVALS) * (whole - trials[0][0]):
             break
         s.report(" + ".join(trial.keys))
         keys = at | {key}
@@ -93,7 +97,8 @@ def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
 def nominees(s: Search, at: frozenset) -> list[Score]:
     """What may explain enough for its number of parameters, best first, two forms of an effect at most."""
     parent, price = s.refits[at], math.log(max(s.misfit.effective(s.bench.fitted), 3.0))
-    least = s.budget.share * max(parent.chi2 - parent.n, 0.0)
+    best = max((score.gain for score in s.score(at)), default=0.0)
+    least = max(s.budget.share * max(parent.chi2 - parent.n, 0.0), PROMISING * best)
     out, count = [], {}
     for score in s.score(at):
         c = s.bench.candidates[score.key]
@@ -112,7 +117,11 @@ def step(s: Search, parent: Refit, score: Score) -> Refit:
     still = np.zeros((len(bench.y), len(candidate.shapes)))  # shapes mean nothing at zero amplitude
     seed = s.misfit.whiten(np.concatenate([old, new, still], axis=1), names)
     start = {**parent.values, **score.setting}
-    return refit(bench, s.misfit, (*parent.keys, score.key), start, iterations=1, final=False, seed=seed)
+    bench.kind = COARSE
+    try:
+        return refit(bench, s.misfit, (*parent.keys, score.key), start, iterations=1, final=False, seed=seed)
+    finally:
+        bench.kind = FINE
 
 
 def finish(s: Search, keys: tuple[str, ...], start: Refit) -> Refit:

@@ -11,7 +11,7 @@ from tissuejax.diagnosis.locate import Located, locate
 from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.remainder import over_places, remainder
 from tissuejax.diagnosis.search import Search, best_of_each
-from tissuejax.diagnosis.stiffness_map import regions
+from tissuejax.diagnosis.stiffness_map import fitted_region, regions
 
 
 @dataclass
@@ -37,7 +37,8 @@ class Diagnosis:
 
     def located(self) -> list[Located]:
         """Where the base model misses: in time, drive, channel, and in space where maps were made."""
-        return [*locate(self.search.bench, self.search.empty.prediction), *regions(self.maps)]
+        found = fitted_region(self.verdict.chosen.values, self.verdict.explained[0])
+        return [*locate(self.search.bench, self.search.empty.prediction), *found, *regions(self.maps)]
 
     def as_dict(self) -> dict:
         """`result.json`."""

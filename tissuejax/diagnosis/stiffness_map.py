@@ -5,6 +5,8 @@ over the element's volume. The map locates; contrast and extent come from a refi
 white, however wrong it is). Depth is its weak coordinate.
 """
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,6 +60,21 @@ class StiffnessMap:
         weight = np.maximum(self.sign * self.gain, 0)
         away = np.sum((self.centres - self.centre) ** 2, axis=1)
         return float(np.sqrt(weight @ away / max(weight.sum(), 1e-300)))
+
+
+def fitted_region(values: Mapping[str, float], share: float) -> list[Located]:
+    """The inclusion of a refit as a place, if there is one: sharper than a map, and with its size."""
+    if values.get("effects.inclusion.contrast", 0.0) == 0.0:
+        return []
+    x, y, z, radius = (values[f"effects.inclusion.{c}"] for c in ("x", "y", "z", "radius"))
+    half = radius / values.get("effects.inclusion.flatness", 1.0)
+    factor = math.exp(values["effects.inclusion.contrast"])
+    what = (
+        f"{factor:.2g} times as stiff around ({1e3 * x:.1f}, {1e3 * y:.1f}, {1e3 * z:.1f}) mm, half widths "
+        f"{1e3 * radius:.1f} mm across and {1e3 * half:.1f} mm in depth (refit)"
+    )
+    details = {"centre": [x, y, z], "size": radius, "half_height": half, "unit": "m", "factor": factor}
+    return [Located("all", "all", what, min(max(share, 0.0), 1.0), "region", details)]
 
 
 def regions(maps: list[StiffnessMap]) -> list[Located]:

@@ -3,11 +3,14 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
+import jax
+import jax.numpy as jnp
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
+from tissuejax.tled.capsule import ballast
 from tissuejax.tled.scene import Scene
 
 
@@ -30,4 +33,5 @@ class Capsule(Effect):
         return (Parameter("stiffness", "N/m", 0.0, 0.0, 1e4, "shear modulus times thickness", scale=2.0),)
 
     def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
-        return scene.put({"tissue.capsule": p["stiffness"]})
+        held = ballast(scene.body, jax.lax.stop_gradient(jnp.asarray(p["stiffness"])), scene.clock.step)
+        return scene.put({"tissue.capsule": p["stiffness"], "probe.mass": scene.probe.mass + held})

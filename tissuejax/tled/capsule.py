@@ -54,6 +54,21 @@ def energy(skin: Skin, capsule: Float[Array, ""], u: Float[Array, "3 v S"]) -> F
     return jnp.sum(skin.area * (capsule / 2) * (stretch + 1 / area_ratio - 3))
 
 
+def ballast(body: Body, capsule: Float[Array, ""], step: Float[Array, ""]) -> Float[Array, " N"]:
+    """Mass with which the membrane alone would stand a time step, kg a node; nothing without a membrane.
+
+    A facet's stiffness is at most k = 4 c area sum |grad N|^2 (plane stress of an incompressible sheet, trace bound);
+    nodes of mass k h^2 / 4 vibrate with omega h <= 2. Twice that, since a squeezed sheet stiffens.
+    """
+    ((aa, _, bb), area, nodes, _) = skin(body)  # inverse metric of the mid-point
+    count = nodes.shape[0]
+    spread = aa + bb if count == 4 else 2 * (aa + bb)
+    mass = 2 * (4 * capsule * area * spread) * step**2 / 4
+    return (
+        jnp.zeros_like(body.points[:, 0]).at[nodes].add(jnp.broadcast_to(mass, nodes.shape).astype(body.points.dtype))
+    )
+
+
 def forces(skin: Skin, capsule: Float[Array, ""], u: Float[Array, "3 N"]) -> Float[Array, "3 N"]:
     """Internal forces of the membrane, (3, N), N."""
     ue = u.at[:, skin.nodes].get(mode="promise_in_bounds")

@@ -113,7 +113,7 @@ def advance(m: Machine, state: State, drive: Drive) -> tuple[State, Felt]:
     f = outer - inner
     half = 0.5 * settings.mass_damping * h
     pushed = ((1.0 - half) * v + h * f / m.mass) / (1.0 + half)
-    slip = support.slide(scene, m.hold, state.slip, f, real) if support.slips(scene) else state.slip
+    slip = support.slide(scene, m.hold, state.slip, f, m.mass) if support.slips(scene) else state.slip
     moved = u + h * pushed
     moved = jnp.where(m.hold.held, support.target(scene, m.hold, slip, drive.motion), moved)
     pushed = jnp.where(m.hold.held, (moved - u) / h, pushed)

@@ -1,8 +1,9 @@
 """What the support does to the fixed nodes: prescribed motion, and slip over a bedding that gives way.
 
 Held components follow u = pattern * displacement(t) + slip. The slip (tangential: x and y) answers the pull of the
-tissue: an elastic part compliance * traction, reached by relaxation that is stable at any compliance, and a viscous
-part that creeps at fluidity * traction. Both are zero at their neutral value: the bonded support to the last bit.
+tissue: an elastic part, a node of its own mass on a spring of area / compliance taken implicitly (stable from bonded to
+free, and as quick as the tissue itself), and a viscous part that creeps at fluidity * traction. Both are zero at their
+neutral value: the bonded support to the last bit.
 """
 
 from typing import NamedTuple
@@ -23,10 +24,11 @@ class Hold(NamedTuple):
 
 
 class Slip(NamedTuple):
-    """Slip of the fixed nodes, (2, F): elastic and viscous; None where the scene has none."""
+    """Slip of the fixed nodes, (2, F): elastic and viscous; None where the scene has none. `speed` of the elastic."""
 
     elastic: Float[Array, "2 F"] | None
     viscous: Float[Array, "2 F"] | None
+    speed: Float[Array, "2 F"] | None = None
 
 
 def hold(scene: Scene, stiffness: Float[Array, " N"] | None) -> Hold:
@@ -49,7 +51,7 @@ def slips(scene: Scene) -> bool:
 def footprint(scene: Scene) -> Float[Array, " F"]:
     """Area of the support that each fixed node stands for, m^2: a share of the facets all of whose nodes are fixed."""
     body = scene.body
-    fixed = jnp.zeros(len(body.points)).at[body.fixed].set(1.0)
+    fixed = jnp.zeros_like(body.points[:, 0]).at[body.fixed].set(1.0)
     x = body.points[body.facets]
     diagonals = (x[:, 2] - x[:, 0], x[:, -1] - x[:, 1])
     area = 0.5 * jnp.linalg.norm(jnp.cross(*diagonals), axis=-1)
@@ -61,30 +63,38 @@ def footprint(scene: Scene) -> Float[Array, " F"]:
 def bonded(scene: Scene) -> Slip:
     """No slip yet."""
     support, zero = scene.support, jnp.zeros_like(scene.body.held.T[:2])
-    return Slip(None if support.compliance is None else zero, None if support.fluidity is None else zero)
+    gives = None if support.compliance is None else zero
+    return Slip(gives, None if support.fluidity is None else zero, gives)
 
 
-def slide(scene: Scene, hold: Hold, slip: Slip, f: Float[Array, "3 N"], step: Float[Array, ""]) -> Slip:
-    """Slip after `step` seconds of real time under the net internal and external force f on the tissue, N."""
-    support = scene.support
+def slide(scene: Scene, hold: Hold, slip: Slip, f: Float[Array, "3 N"], mass: Float[Array, " N"]) -> Slip:
+    """Slip one step later under the net internal and external force f on the tissue, N; `mass` of the nodes, kg.
+
+    Elastic, with spring k = area / c, step h and mass damping a: v <- (c ((1 - a h/2) m v + h f) - h area s) /
+    (c (1 + a h/2) m + h^2 area), s <- s + h v; at c = 0 nothing moves.
+    """
+    support, clock = scene.support, scene.clock
+    h, half = clock.step, 0.5 * scene.settings.mass_damping * clock.step
     bare = hold.area <= 0
     area = jnp.where(bare, 1.0, hold.area)
     traction = jnp.where(bare, 0.0, f[:2, scene.body.fixed] / area)
     stiffness = hold.pull / area  # Pa/m, an upper estimate: what the tissue gives back per slip
-    elastic, viscous = slip
+    elastic, viscous, speed = slip
     if elastic is not None:
-        rate = 1.0 / (1.0 + support.compliance * stiffness)
-        elastic = elastic + rate * (support.compliance * traction - elastic)
+        m, c = mass[scene.body.fixed], support.compliance
+        push = c * ((1.0 - half) * m * speed + h * area * traction) - h * area * elastic
+        speed = jnp.where(bare, 0.0, push / (c * (1.0 + half) * m + h * h * area))
+        elastic = elastic + h * speed
     if viscous is not None:
-        creep = support.fluidity * step
+        creep = support.fluidity * h * clock.compression
         viscous = viscous + creep * traction / (1.0 + creep * stiffness)
-    return Slip(elastic, viscous)
+    return Slip(elastic, viscous, speed)
 
 
 def target(scene: Scene, hold: Hold, slip: Slip, motion: Float[Array, " 3"] | None) -> Float[Array, "3 N"]:
     """Prescribed displacement of the held components, (3, N)."""
     u = jnp.zeros_like(hold.pattern) if motion is None else hold.pattern * motion[:, None]
-    for part in slip:
+    for part in (slip.elastic, slip.viscous):
         if part is not None:
             u = u.at[:2, scene.body.fixed].add(part, mode="promise_in_bounds")
     return u

@@ -1,0 +1,113 @@
+"""The bench of probings on a small box: what needs no run, what is run once, and a shift that is found again."""
+
+import numpy as np
+import pytest
+
+from tests.probing.bench import VALUES, measured, recording, sample
+from tissuejax.diagnosis import probing_free
+from tissuejax.diagnosis.misfit import white
+from tissuejax.diagnosis.probing import ProbingBench
+from tissuejax.diagnosis.probing_numerics import numerics
+from tissuejax.diagnosis.probing_runs import COARSE
+from tissuejax.diagnosis.refit import refit
+from tissuejax.energies.catalogue import energy
+from tissuejax.recordings.recording import Sample
+
+QUICK = {
+    "mesh": "file", "compression": 3.0, "interval": 0.04, "step": 8e-4, "stiffness_damping": 1e-4, "processes": 1,
+}  # fmt: skip
+TWO = sample(recording("a"), recording("b", place=(-0.004, 0.004), depth=2.5e-3))
+DEPTH = 2e-4
+
+
+def bench_of(given: Sample, keep=None) -> ProbingBench:
+    return ProbingBench.of(given, energy("reduced-polynomial-2"), ("a", "b"), (), keep=keep, **QUICK)
+
+
+@pytest.fixture(scope="module")
+def pressed_too_deep() -> Sample:
+    """The two recordings as the bench itself predicts them with the probe lower than recorded, and noise."""
+    bench, rng = bench_of(TWO), np.random.default_rng(4)
+    told = bench.runs._predictor("fine", ()).predict(VALUES | {"effects.contact-offset.depth": DEPTH})
+    made = {n: measured(told[n], r, rng) for n, r in TWO.recordings.items()}
+    return Sample(TWO.name, made, geometry=TWO.geometry, density=TWO.density)
+
+
+@pytest.fixture(scope="module")
+def bench(pressed_too_deep) -> ProbingBench:
+    return bench_of(pressed_too_deep)
+
+
+def test_an_effect_at_neutral_asks_for_no_run(bench):
+    plain = bench.predict(VALUES)
+    count = bench.runs.count
+    neutral = {"effects.friction.coefficient": 0.0, "effects.inclusion.contrast": 0.0, "effects.inclusion.x": 0.01}
+    assert np.array_equal(bench.predict(VALUES | neutral), plain)
+    assert bench.runs.count == count
+
+
+def test_what_acts_in_one_recording_is_run_in_that_one(bench):
+    bench.predict(VALUES)
+    count = bench.runs.count
+    bench.predict(VALUES | {"effects.contact-offset.depth.b": 1e-4})
+    assert bench.runs.count == count + 1
+
+
+@pytest.mark.parametrize(
+    ("path", "step", "more"),
+    [
+        ("effects.contact-offset.depth.a", 1e-4, {}),
+        ("effects.machine-compliance.compliance", 5e-4, {}),
+        ("effects.contact-offset.delay", 0.02, {}),
+        ("effects.periodic.sin.a", 1e-4, {"effects.periodic.frequency": 0.9}),
+        ("effects.periodic.frequency", 0.02, {"effects.periodic.sin.a": 3e-4, "effects.periodic.frequency": 0.9}),
+    ],
+)
+def test_motion_of_probe_support_and_rig_needs_no_run_of_its_own(bench, path, step, more):
+    """The derivative from displaced probes against a central difference of simulations with the effect in."""
+    at = VALUES | more
+    now = at.get(path, 0.0)
+    low = now - step if path.endswith(("frequency", "delay")) else now
+    up, down = bench.runs.many([({**at, path: v}, ("a",), COARSE) for v in (now + step, low)])
+    true = (up - down) / (now + step - low)
+    free = probing_free.moving(bench, {path: now} | at, path, ("a",))
+    rows = bench.mask(("a",))
+    error = ((free - true) / bench.sigma)[rows]
+    assert np.linalg.norm(error) < 0.12 * np.linalg.norm((true / bench.sigma)[rows])
+
+
+def test_sensors_are_blind_to_each_other(bench):
+    at = bench.at(VALUES)
+    origin = bench.predict(VALUES)
+    for path, blind in (("effects.drift.offset_z", "markers"), ("effects.clock-lag.lag", "force")):
+        change = probing_free.reported(bench, {path: 0.0} | at, path, 1e-3, origin)
+        for s in bench.segments:
+            if s.channel == blind:
+                assert not np.any(change[s.rows]), path
+        assert np.any(change)
+
+
+def test_a_probe_that_is_too_low_is_found_again(bench):
+    found = refit(bench, white(bench), ("contact-offset/depth",), {}, iterations=8, tolerance=2.0)
+    depth, std = found.values["effects.contact-offset.depth"], found.std["effects.contact-offset.depth"]
+    assert abs(depth - DEPTH) < 4 * std
+    assert std < 0.2 * DEPTH
+    assert found.chi2 < 1.1 * found.n
+
+
+def test_the_error_of_the_simulation_does_not_explain_a_shift(bench):
+    misfit = white(bench)
+    base = refit(bench, misfit, (), {}, iterations=6, tolerance=5.0)
+    found = numerics(bench, misfit, base)
+    assert set(found.rms) == {"mesh", "step", "penalty"}
+    assert not found.enough(base)
+
+
+def test_a_stopped_diagnosis_finds_its_runs_again(pressed_too_deep, tmp_path):
+    first = bench_of(pressed_too_deep, tmp_path / "runs")
+    told = first.predict(VALUES)
+    again = bench_of(pressed_too_deep, tmp_path / "runs")
+    assert np.array_equal(again.predict(VALUES), told)
+    assert again.runs.count == 0
+    again.runs.forget()
+    assert not (tmp_path / "runs").exists()
