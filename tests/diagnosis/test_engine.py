@@ -8,7 +8,6 @@ from tissuejax.diagnosis.decide import decide
 from tissuejax.diagnosis.locate import locate
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.refit import refit
-from tissuejax.diagnosis.remainder import remainder
 from tissuejax.diagnosis.score import complement, gain, scores
 from tissuejax.diagnosis.search import search
 
@@ -95,16 +94,3 @@ def test_a_period_is_located():
     bench = spring({"wave.s": 0.3, "wave.period": 2.3})
     period = next(x for x in locate(bench, bench.predict({"a": 10.0, "b": 20.0})) if x.kind == "period")
     assert period.details["period"] == pytest.approx(2.3, rel=0.05)
-
-
-def test_the_remainder_is_found_where_it_was_put():
-    bench = spring({})
-    for s in bench.segments:
-        bench.y[s.rows] += 0.5 * np.sin(12 * s.drive)
-    found = remainder(bench, bench.predict({"a": 10.0, "b": 20.0}), "force")
-    assert found.share["drive"] > 0.9
-    assert found.share["rate"] < 0.05
-    curve = found.curves["drive"]
-    shape = 0.5 * np.sin(12 * np.array(curve["x"]))
-    value = np.array(curve["value"])
-    assert np.std(value - value.mean() - shape + shape.mean()) < 0.05

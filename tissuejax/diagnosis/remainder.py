@@ -17,6 +17,7 @@ from jaxtyping import Float
 from scipy.interpolate import BSpline
 
 from tissuejax.diagnosis.bench import Bench, Segment
+from tissuejax.diagnosis.locate import rest_value
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class Remainder:
         channel, unit: which series.
         constant: mean of the smooth part, in `unit`.
         curves: {"drive" | "rate" | "time/RECORDING": {"x", "value"}}, in order of x; x in SI.
-        share: fraction of the residual's sum of squares that each part holds, "noise" what none does.
+        share: fraction of the residual's sum of squares that each part accounts for, "noise" what none does.
         series: {recording: {"time", "drive", "rate", "remainder", "smooth"}}.
     """
 
@@ -66,7 +67,10 @@ def remainder(bench: Bench, prediction: Float[np.ndarray, " N"], channel: str, c
     segments = [s for s in bench.segments if s.channel == channel and s.component == component]
     r = np.concatenate([(bench.y - prediction)[s.rows] for s in segments])
     sigma = np.concatenate([bench.sigma[s.rows] for s in segments])
-    drive, rate = np.concatenate([s.drive for s in segments]), np.concatenate([_rate(s) for s in segments])
+    # stretch and shear of several kinds of test meet as strains
+    mixed = len({s.drive_name for s in segments}) > 1
+    drive = np.concatenate([s.drive - (rest_value(s) if mixed else 0.0) for s in segments])
+    rate = np.concatenate([_rate(s) for s in segments])
     blocks = {"drive": _basis(drive, drive.min(), drive.max() + 1e-12, 12)}
     blocks["rate"] = _basis(rate, rate.min(), rate.max() + 1e-12, 9)
     at = 0
@@ -95,7 +99,9 @@ def remainder(bench: Bench, prediction: Float[np.ndarray, " N"], channel: str, c
     whole_parts = {"drive": parts["drive"], "rate": parts["rate"], "time": timed}
     constant = float(sum(v.mean() for v in whole_parts.values()))
     squares = float(np.sum(r**2)) or 1.0
-    share = {name: float(np.sum((v - v.mean()) ** 2)) / squares for name, v in whole_parts.items()}
+    # covariance with the whole smooth part: shares of parts that overlap then add up
+    centred = smooth - smooth.mean()
+    share = {name: float((v - v.mean()) @ centred) / squares for name, v in whole_parts.items()}
     share |= {"constant": len(r) * constant**2 / squares, "noise": float(np.sum((r - smooth) ** 2)) / squares}
     curves = {}
     for name, x in (("drive", drive), ("rate", np.sign(rate) * rate**2)):

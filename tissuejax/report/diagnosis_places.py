@@ -39,14 +39,15 @@ class DiagnosisPlaces(Plot):
         flat = [np.concatenate([z[s.rows] for s in segments]) for z in squares]
         seen = [i for i in range(4) if np.any(which == i)]
         out["phase"] = ([PHASES[i] for i in seen], *([float(z[which == i].mean()) for i in seen] for z in flat))
-        drive = np.concatenate([s.drive for s in segments])
+        mixed = len({s.drive_name for s in segments}) > 1  # stretch and shear meet as strains
+        drive = np.concatenate([s.drive - (rest_value(s) if mixed else 0.0) for s in segments])
         edges = np.linspace(drive.min(), drive.max() + 1e-12, BINS + 1)
         at = np.clip(np.digitize(drive, edges) - 1, 0, BINS - 1)
         full = [i for i in range(BINS) if np.sum(at == i) > 5]
         centres = [float(0.5 * (edges[i] + edges[i + 1])) for i in full]
         out["drive"] = (centres, *([float(z[at == i].mean()) for i in full] for z in flat))
-        out["drive_name"] = segments[0].drive_name
-        out["rest"] = rest_value(segments[0])
+        out["drive_name"] = "stretch - 1, or shear" if mixed else segments[0].drive_name
+        out["rest"] = 0.0 if mixed else rest_value(segments[0])
         out["held"] = list(bench.held_out)
         return out
 

@@ -32,7 +32,9 @@ class DiagnosisRemainder(Plot):
         if found.share["noise"] > 0.9:
             return None
         sigma = np.concatenate([bench.sigma[s.rows] for s in scalar if s.label == worst.label])
-        return found, float(np.median(sigma)), f"{worst.drive_name}{label(worst.drive_unit)}", bench.held_out
+        names = {s.drive_name for s in scalar if s.label == worst.label}
+        drive = f"{worst.drive_name}{label(worst.drive_unit)}" if len(names) == 1 else "stretch - 1, or shear"
+        return found, float(np.median(sigma)), drive, bench.held_out
 
     def caption(self, data: tuple[Remainder, float, str, tuple[str, ...]]) -> str:
         """How much is smooth and where to look first."""

@@ -82,7 +82,7 @@ class DiagnosisResiduals(Plot):
         handles = [Line2D([], [], color=c) for c in (FAINT, MODEL, HELD)]
         figure.legend(
             handles,
-            ["base model", "verdict, fitted", "verdict, held out"],
+            ["base model", "with effects, fitted", "with effects, held out"],
             loc="outside upper right",
             ncols=3,
             fontsize=8,
