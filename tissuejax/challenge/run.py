@@ -73,8 +73,7 @@ def answer(folder: Path, name: str, energy: str) -> str:
     """Diagnose one case into DIR/results/NAME, whole or not at all; returns its name."""
     final = folder / "results" / name
     partial = folder / "results" / f".{name}.partial"
-    shutil.rmtree(partial, ignore_errors=True)
-    partial.mkdir(parents=True)
+    partial.mkdir(parents=True, exist_ok=True)  # a stopped case of minutes goes on from the simulations it left there
     began = time.perf_counter()
     try:
         diagnosed(folder / "cases" / f"{name}.h5", energy, partial)
@@ -89,6 +88,7 @@ def answer(folder: Path, name: str, energy: str) -> str:
             },
         )
     write_json(partial / "cost.json", {"seconds": time.perf_counter() - began})
+    shutil.rmtree(partial / "runs", ignore_errors=True)
     shutil.rmtree(final, ignore_errors=True)
     partial.rename(final)
     return name

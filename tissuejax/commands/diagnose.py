@@ -32,7 +32,8 @@ would tell), or unexplained (something is missing that no effect of the catalogu
   tissuejax diagnose rubber.toml --energy ogden-3 --ogden-form mu/alpha --effect viscoelasticity --effect softening
 
 What is written into --out: result.json (every number), report.html (one page to read and keep), remainder.json (what is
-still left, as smooth functions of drive, rate and time) and the figures as PNG.
+still left, as smooth functions of drive, rate and time) and the figures as PNG. A diagnosis of probings takes minutes;
+one that was stopped goes on where it was when the same command is given again.
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
@@ -49,6 +50,7 @@ still left, as smooth functions of drive, rate and time) and the figures as PNG.
     def run(self, given: argparse.Namespace) -> Reply:
         """Read, diagnose, write."""
         sample = read(given.file)
+        out = given.out or Path("out") / sample.name
         found = diagnose(
             sample,
             given.energy,
@@ -56,8 +58,9 @@ still left, as smooth functions of drive, rate and time) and the figures as PNG.
             progress=for_terminal(),
             effects=given.effect,
             ogden_form=given.ogden_form,
+            keep=out / "runs",
         )
-        return told(found, write_diagnosis(found, given.out or Path("out") / sample.name))
+        return told(found, write_diagnosis(found, out))
 
 
 def told(found: Diagnosis, written: dict[str, Path]) -> Reply:

@@ -39,6 +39,7 @@ def diagnose(
     effects: Sequence[str] | None = None,
     ogden_form: str | None = None,
     budget: Budget | None = None,
+    keep: Path | None = None,
 ) -> Diagnosis:
     """What is missing in the model of a sample: the verdict, with everything it rests on.
 
@@ -50,6 +51,8 @@ def diagnose(
         effects: names of the effects to try; all that can act by default.
         ogden_form: for `ogden-N`.
         budget: how much the search may spend.
+        keep: folder in which a stopped diagnosis of probings finds its finished simulations again (removed at the
+            end); inside `out` by default.
 
     Raises:
         InputError: a file that can't be read, an unknown recording or effect, fewer samples than parameters.
@@ -63,7 +66,7 @@ def diagnose(
     base = named_energy(energy, ogden_form)
     kind = experiment(sample.recordings[fitted[0]].experiment).kind
     if kind == "probing":
-        keep = None if out is None else Path(out) / "runs"
+        keep = keep or (None if out is None else Path(out) / "runs")
         bench, budget = ProbingBench.of(sample, base, fitted, held_out, effects, keep), budget or PROBING
     else:
         sigma, more = sigmas(sample, (*fitted, *held_out))

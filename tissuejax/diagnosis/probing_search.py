@@ -84,12 +84,13 @@ def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
     whole = float(before @ before)
     grown: list[frozenset] = []
     for chi2, key, trial in trials[:most]:
-        done = any(quality(s, s.refits[k]).noise for k in grown)
-        if whole - chi2 < (CLOSE if done else RIVALS) * (whole - trials[0][0]):
+        enough = any(quality(s, s.refits[k]).noise for k in grown)
+        if whole - chi2 < (CLOSE if enough else RIVALS) * (whole - trials[0][0]):
             break
         s.report(" + ".join(trial.keys))
         keys = at | {key}
-        s.refits[keys] = finish(s, trial.keys, trial)
+        done = s.refits[keys] = finish(s, trial.keys, trial)
+        s.report(f"{' + '.join(trial.keys)}: chi-square {done.chi2 / done.n:.3g}")
         grown.append(keys)
     return grown
 
