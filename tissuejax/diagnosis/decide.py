@@ -26,7 +26,7 @@ NEEDED = 0.02
 HELPLESS = 0.2  # share from which an effect may do without helping the held-out recordings
 LEFT = 0.15
 LEFT_SEEN = 0.06  # the same where what is left exceeds the noise itself: a quarter of the size
-LEFT_DEAR, CLOSE_DEAR = 0.08, 0.01  # where a prediction is a simulation
+LEFT_DEAR, CLOSE_DEAR, SEEN_DEAR = 0.08, 0.01, 0.05  # where a prediction is a simulation
 TEMPER = 4.0
 # How often an answer of its kind should be right, by the weight of the chosen set, whether noise is left, and the
 # amplitude of what is left. Round numbers set on development cases; the challenge holds them against what was right.
@@ -82,7 +82,10 @@ def needed(s: Search, larger: Refit, smaller: Refit) -> bool:
     outside = s.outside(smaller) - s.outside(larger)
     if share < NEEDED:
         noise = quality(s, larger).noise and not quality(s, smaller).noise
-        return noise and gained > 3 * GAIN and (outside > GAIN / 2 or not larger.n_held)
+        least = 3 * GAIN
+        if s.bench.dear:  # laws and meshes differ by as much
+            least = max(SEEN_DEAR * (larger.n + larger.n_held), NEEDED / 4 * sum(excess(s, s.empty)))
+        return noise and gained > least and (outside > GAIN / 2 or not larger.n_held)
     return outside > 0 or share > HELPLESS or not larger.n_held
 
 
