@@ -8,6 +8,7 @@ tissuejax study fits/porcine-skin
 from pathlib import Path
 
 import tissuejax as tj
+from tissuejax.diagnosis.search import Budget
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.progress import for_terminal
 from tissuejax.report.diagnosis_page import write_diagnosis
@@ -16,6 +17,7 @@ from tissuejax.storage import write_json
 
 ENERGIES = ("demiray",)
 SHOWN = ("demiray", "off_y")
+BUDGET = Budget(most=2, beam=(1, 2), nominees=(6, 3))
 
 
 def main(folder: Path) -> str:
@@ -23,7 +25,7 @@ def main(folder: Path) -> str:
     sample, records = tj.read(folder / "skin.toml"), {}
     for energy in ENERGIES:
         for path in sample.recordings:
-            found = tj.diagnose(sample, energy, holdout=path, progress=for_terminal())
+            found = tj.diagnose(sample, energy, holdout=path, budget=BUDGET, progress=for_terminal())
             records[f"{energy}, without {path}"] = brief(found)
             if (energy, path) == SHOWN:
                 write_diagnosis(found, folder / "figures" / "diagnosis", remainders=False)
