@@ -1,15 +1,17 @@
 """Time of one explicit step by elements, energy and precision; memory of a large body. Run as a script.
 
-    OMP_NUM_THREADS=1 XLA_FLAGS=--xla_cpu_multi_thread_eigen=false python tests/bench/bench_step.py [--large]
+    OMP_NUM_THREADS=1 XLA_FLAGS=--xla_cpu_multi_thread_eigen=false python tests/bench/bench_step.py
 
-Prints a table and writes `results/step.json`: nanoseconds of CPU time an element and step, best of several, and ratios.
-The energies of one size take turns, so that a busy machine disturbs their ratio least.
+Prints a table and writes `results/step.json` and `results/growth.png`: nanoseconds of CPU time an element and step, the
+best of several, and ratios. The energies of one size take turns, so that a busy machine disturbs their ratio least.
+"bent" is the same cube taken for general hexes, as bodies from a point cloud are.
 """
 
 import json
 import os
 import platform
 import resource
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -73,12 +75,45 @@ def write(name: str, figures: dict) -> None:
     print(text)
 
 
+def large() -> None:
+    """Memory of a body of 85,184 hexes, in a process of its own."""
+    scene = cube(44, 1, jnp.float32, steps=2)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+    jax.block_until_ready(compiled(scene))
+    after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+    print(json.dumps({"peak memory MiB": after, "of it before the run (Python, JAX, mesh)": before}))
+
+
+def draw(figures: dict) -> None:
+    """Growth with elements and with steps."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.5, 3.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    sizes = [1000, 8000, 27000]
+    for name in ("neo-Hookean float32", "N=4 float32", "N=4 float32, bent", "neo-Hookean float64"):
+        cost = [figures[f"{n} hexes"][name] * n * 1e-6 for n in sizes]
+        left.loglog(sizes, cost, "o-", markersize=4, linewidth=1.2, label=name)
+    left.loglog(sizes, [140e-6 * n for n in sizes], ":", color="#777777", label="140 ns an element (NiftySim)")
+    left.set(xlabel="hexes", ylabel="ms a step")
+    steps = figures["1000 hexes, s by steps"]
+    right.plot([int(n) for n in steps], list(steps.values()), "o-", markersize=4, linewidth=1.2)
+    right.set(xlabel="steps, 1,000 hexes, N=4 float32", ylabel="s", xlim=(0, None), ylim=(0, None))
+    left.legend(fontsize=7, frameon=False)
+    for ax in (left, right):
+        ax.tick_params(labelsize=8)
+        ax.spines[["top", "right"]].set_visible(False)
+    figure.savefig(RESULTS / "growth.png", dpi=100)
+
+
 def main() -> None:
     figures = {}
     for n in (10, 20, 30):
+        poly = cube(n, 4, jnp.float32)
         scenes = {
             "neo-Hookean float32": cube(n, 1, jnp.float32),
-            "N=4 float32": cube(n, 4, jnp.float32),
+            "N=4 float32": poly,
+            "N=4 float32, bent": poly.put({"body.element": poly.body.element.general}),
             "neo-Hookean float64": cube(n, 1, jnp.float64),
         }
         best = measure(scenes)
@@ -86,12 +121,18 @@ def main() -> None:
             "N=4 over neo-Hookean": round(best["N=4 float32"] / best["neo-Hookean float32"], 3),
             "float64 over float32": round(best["neo-Hookean float64"] / best["neo-Hookean float32"], 2),
         }
-    if "--large" in sys.argv:
-        scene = cube(44, 1, jnp.float32, steps=2)
+        print(f"{n**3} hexes", figures[f"{n**3} hexes"], flush=True)
+    by_steps = {}
+    for steps in (50, 100, 200):
+        scene = cube(10, 4, jnp.float32, steps=steps)
         jax.block_until_ready(compiled(scene))
-        figures["85184 hexes"] = {"peak memory MiB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024}
+        by_steps[20 * steps] = round(min(cpu(compiled, scene) for _ in range(4)), 4)
+    figures["1000 hexes, s by steps"] = by_steps
+    told = subprocess.run([sys.executable, __file__, "--large"], capture_output=True, text=True, check=True)
+    figures["85184 hexes"] = json.loads(told.stdout.splitlines()[-1])
     write("step", {"unit": "ns of CPU time an element and step"} | figures)
+    draw(figures)
 
 
 if __name__ == "__main__":
-    main()
+    large() if "--large" in sys.argv else main()

@@ -64,13 +64,16 @@ def bonded(depth: float) -> float:
 def pressed(depth: float, counts, penalty: float = 1.0) -> float:
     """Force on a ball at rest in a layer of 20 mm, radius 80 mm (a quarter of it), N; `penalty` times the automatic."""
     body = disc(0.08, LAYER, counts, inward=4.2, upward=2.0)
+    steps = int(np.ceil(depth / 2.5e-4))  # m at a time: a jump as deep as an element turns it inside out
     path = np.array([[0, 0, LAYER + BALL], [0, 0, LAYER + BALL - depth]])
     scene = build.scene(
         body.geometry, ReducedPolynomial(order=1), Quadratic(), dict(C10=MU / 2), dict(K=K), 1000.0, np.arange(2.0),
         np.arange(2.0), path, BALL, held=body.held,
     )  # fmt: skip
     scene = scene.put({"probe.penalty": scene.probe.penalty * penalty, "probe.mass": scene.probe.mass * penalty})
-    found = statics.checked(statics.compiled(scene, 1.0, tolerance=1e-6, margin=4.0))
+    for k in range(1, steps + 1):
+        found = statics.checked(statics.compiled(scene, k / steps, tolerance=1e-6, margin=4.0))
+        scene = scene.put({"body.settled": found.displacement})
     return 4 * float(found.force[2])
 
 

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from tests.reference import test_indentation as indentation
 from tests.tled import cases
 from tissuejax.errors import InputError, NotConverged
 from tissuejax.mesh.columns import box
@@ -71,3 +72,11 @@ def test_what_has_no_answer_says_so():
         gravity.stress_free(cases.plain(BLOCK, np.arange(2.0)))
     with pytest.raises(NotConverged, match="no static equilibrium after 25 iterations"):
         statics.checked(statics.compiled(cases.plain(BLOCK, np.arange(2.0), gravity=DOWN), most=25))
+
+
+def test_an_answer_with_inverted_elements_is_none():
+    """A ball that jumps two elements deep turns them inside out, and the search comes to rest there."""
+    deep = indentation.scene((12, 9), 0.02)
+    found = statics.compiled(deep, 2e-3 / 0.02, tolerance=2e-6, margin=4.0)
+    with pytest.raises(NotConverged, match="inverted|burst"):
+        statics.checked(found)

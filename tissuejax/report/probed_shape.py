@@ -47,7 +47,7 @@ class ProbedShape(Plot):
         """One row a site."""
         figure = Figure(figsize=(10, 3.6 * len(data)), layout="constrained", facecolor=PAPER)
         for row, site in enumerate(data):
-            solid = figure.add_subplot(len(data), 2, 2 * row + 1, projection="3d")
+            solid = figure.add_subplot(len(data), 2, 2 * row + 1, projection="3d", computed_zorder=False)
             _solid(solid, site)
             plan = figure.add_subplot(len(data), 2, 2 * row + 2)
             tidy(plan)
@@ -58,18 +58,19 @@ class ProbedShape(Plot):
 def _solid(ax, site: Deformed) -> None:
     x = 1e3 * site.points
     ax.add_collection3d(
-        Poly3DCollection(x[site.facets], facecolor="#dfe7ec", edgecolor="#9fb0bc", linewidth=0.25, alpha=0.85)
+        Poly3DCollection(x[site.facets], facecolor="#dfe7ec", edgecolor="#9fb0bc", linewidth=0.25, zorder=1)
     )
     a, b = np.meshgrid(np.linspace(0, 2 * np.pi, 25), np.linspace(0, np.pi, 13))
     ball = 1e3 * (
         site.centre[:, None, None] + site.radius * np.stack([np.cos(a) * np.sin(b), np.sin(a) * np.sin(b), np.cos(b)])
     )
-    ax.plot_wireframe(*ball, color="#c0392b", linewidth=0.35)
-    ax.scatter(*(1e3 * site.measured.T), color=INK, s=14, depthshade=False)
-    ax.scatter(*(1e3 * site.simulated.T), color=MODEL, marker="x", s=26, depthshade=False)
+    ax.plot_wireframe(*ball, color="#c0392b", linewidth=0.35, alpha=0.6, zorder=3)
+    ax.scatter(*(1e3 * site.measured.T), color=INK, s=14, depthshade=False, zorder=4)
+    ax.scatter(*(1e3 * site.simulated.T), color=MODEL, marker="x", s=26, depthshade=False, zorder=5)
     low, high = x.min(0), x.max(0)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], max(high[2], 1e3 * site.centre[2])))
-    ax.set_box_aspect(np.maximum(high - low, 1.0))
+    sides = np.array([*(high - low)[:2], max(high[2], 1e3 * site.centre[2]) - low[2]])
+    ax.set_box_aspect(np.maximum(sides, 1.0), zoom=1.35)
     ax.view_init(elev=32, azim=-60)
     ax.set_axis_off()
     ax.set_title(f"{site.name}, t = {site.time:.2f} s", loc="left", fontsize=9.5, color=INK)

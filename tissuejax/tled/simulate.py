@@ -134,7 +134,8 @@ def proceed(m: Machine, state: State) -> Outcome:
     else:
         numbered = (jnp.arange(blocks), drive)
         state, (series, checks) = jax.lax.scan(_while_needed(block, length, clock.needed), state, numbered)
-    felt, markers, pace = jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:])[: clock.frames], series)
+    felt, markers, pace = jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), series)
+    felt, markers = jax.tree.map(lambda x: x[: clock.frames], (felt, markers))
     return _outcome(scene, felt, markers, pace, checks, length, state)
 
 
@@ -216,13 +217,13 @@ def _checks(m: Machine, state: State, centre) -> Checks:
 def _outcome(scene, felt, markers, pace, checks, length, state) -> Outcome:
     clock = scene.clock
     first = jnp.argmax(checks.failed)
-    looked = jnp.minimum((first + 1) * length, clock.frames) - 1
-    lost = jnp.where(jnp.all(pace.finite), clock.frames, jnp.argmin(pace.finite))  # the first frame that is not finite
-    burst = lost <= looked
+    looked = (first + 1) * length - 1
+    lost = jnp.argmin(pace.finite)  # the first frame that is not finite, if there is one
+    burst = ~pace.finite[lost] & (lost <= looked)
     node = pace.node[jnp.maximum(lost - 1, 0)]
     near = jnp.argmax(jnp.any(scene.body.cells == node, 1))
     bad = jnp.any(checks.failed)
-    frame = jnp.where(bad, jnp.where(burst, lost, looked), -1)
+    frame = jnp.where(bad, jnp.minimum(jnp.where(burst, lost, looked), clock.frames - 1), -1)
     ends = jnp.minimum((jnp.arange(len(checks.failed)) + 1) * length, clock.frames)
     middles = clock.middles - 0.5 * clock.interval / clock.steps  # forces belong to the start of each step
     return Outcome(

@@ -27,16 +27,18 @@ class Equilibrium(eqx.Module):
     """A static solution.
 
     Attributes:
-        displacement: (N, 3), m, NaN where the search ended without an answer.
+        displacement: (N, 3), m, NaN where the search ended without an answer, or with an inverted element.
         residual: greatest unbalanced force over the greatest force present.
         iterations: of dynamic relaxation.
         force: of the tissue on the probe, N (zero without one).
+        inverted: whether an element came out inside out.
     """
 
     displacement: Float[Array, "N 3"]
     residual: Float[Array, ""]
     iterations: Int[Array, ""]
     force: Float[Array, " 3"]
+    inverted: Array
 
 
 class Load(NamedTuple):
@@ -170,11 +172,13 @@ def equilibrium(
         has_aux=True,
     )
     u = jnp.where(at.held, at.target, w)
-    u = jnp.where(residual <= tolerance, u, jnp.nan)
+    volumes = internal.internal_energy(at.scene, at.mesh, jax.lax.stop_gradient(u))[1][: len(scene.body.cells)]
+    inverted = jnp.any(volumes <= 0)  # a search that jumped too far can come to rest so
+    u = jnp.where((residual <= tolerance) & ~inverted, u, jnp.nan)
     force = jnp.zeros(3, u.dtype)
     if at.patch is not None:
         force = contact.forces(at.scene.probe, at.patch, u, at.centre, contact.untouched(at.scene.probe)).force
-    return Equilibrium(u.T, residual, count.astype(int), force)
+    return Equilibrium(u.T, residual, count.astype(int), force, inverted)
 
 
 compiled = jax.jit(equilibrium, compiler_options=COMPILER_OPTIONS, static_argnames=("most",))
@@ -189,6 +193,7 @@ def checked(found: Equilibrium) -> Equilibrium:
     if not bool(jnp.isfinite(found.displacement).all()):
         residual = float(found.residual)
         how = f"unbalanced force {residual:.1e} of the greatest" if 0 <= residual < jnp.inf else "it burst"
+        how = "an element came out inverted" if bool(found.inverted) else how
         raise NotConverged(
             f"no static equilibrium after {int(found.iterations)} iterations: {how}; check loads and support, use "
             "double precision, allow more iterations, a larger margin, or come nearer in smaller steps"
