@@ -32,8 +32,8 @@ would tell), or unexplained (something is missing that no effect of the catalogu
   tissuejax diagnose rubber.toml --energy ogden-3 --ogden-form mu/alpha --effect viscoelasticity --effect softening
 
 What is written into --out: result.json (every number), report.html (one page to read and keep), remainder.json (what is
-still left, as smooth functions of drive, rate, time and place) and the figures as PNG. Probings take minutes to diagnose;
-one that was stopped goes on where it was when the same command is given again.
+still left, as smooth functions of drive, rate, time and place) and the figures as PNG. Probings take minutes; one that
+was stopped goes on where it was when the same command is given again.
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:

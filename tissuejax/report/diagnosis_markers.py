@@ -17,12 +17,13 @@ MOST = 3  # recordings shown, those missed most
 
 @dataclass(frozen=True)
 class Seen:
-    """One recording's markers: what is left of them before and after, and residual over noise of each."""
+    """One recording's markers: what is left of them before and after, five times their noise, residual over noise."""
 
     recording: str
     held: bool
     before: PlaceRemainder
     after: PlaceRemainder
+    noise: float
     chi_before: np.ndarray
     chi_after: np.ndarray
 
@@ -52,7 +53,9 @@ class DiagnosisMarkers(Plot):
             if before is None or after is None:
                 continue
             chi = [per_marker(bench, r.prediction, name, before.markers) for r in (base, chosen)]
-            found.append(Seen(name, name in bench.held_out, before, after, *chi))
+            sigma = [bench.sigma[s.rows] for s in bench.segments if s.recording == name and "marker" in s.component]
+            noise = 5 * float(np.median(np.concatenate(sigma)))
+            found.append(Seen(name, name in bench.held_out, before, after, noise, *chi))
         found.sort(key=lambda s: -float(np.mean(s.chi_before**2)))
         return sorted(found[:MOST], key=lambda s: s.held) or None
 
@@ -71,7 +74,8 @@ class DiagnosisMarkers(Plot):
         """Two rows of maps."""
         figure, axes = grid(2 * len(data), columns=len(data), width=max(4.2 * len(data), 5.0), height=3.2)
         top = max(float(s.chi_before.max()) for s in data)
-        longest = max(float(np.max(np.linalg.norm(s.before.remainder[:, :2], axis=1))) for s in data) or 1.0
+        longest = max(float(np.max(np.linalg.norm(s.before.remainder[:, :2], axis=1))) for s in data)
+        longest = max(longest, max(s.noise for s in data)) or 1.0  # what is noise has short arrows
         span = max(float(np.ptp(s.before.place[:, :2], axis=0).max()) for s in data) or 1.0
         factor, unit = display("m", longest)
         for i, s in enumerate(data):
@@ -85,7 +89,14 @@ class DiagnosisMarkers(Plot):
                 ax.quiver(x, y, *arrow.T, angles="xy", scale_units="xy", scale=1, width=4e-3, color=INK)
                 held = " (held out)" if s.held else ""
                 ax.set_title(f"{s.recording}{held}: {when}", loc="left", fontsize=9)
+                ax.margins(0.12)
                 ax.set(aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
         figure.colorbar(dots, ax=axes, label="residual / noise", shrink=0.6)
-        axes[0].text(0, 1.12, f"longest arrow {longest / factor:.2g} {unit}", transform=axes[0].transAxes, fontsize=8)
+        axes[0].text(
+            0,
+            1.12,
+            f"an arrow of 15 % of the width is {longest / factor:.2g} {unit}",
+            transform=axes[0].transAxes,
+            fontsize=8,
+        )
         return figure

@@ -46,7 +46,9 @@ class DiagnosisPlaces(Plot):
         full = [i for i in range(BINS) if np.sum(at == i) > 5]
         centres = [float(0.5 * (edges[i] + edges[i + 1])) for i in full]
         out["drive"] = (centres, *([float(z[at == i].mean()) for i in full] for z in flat))
-        out["drive_name"] = "stretch - 1, or shear" if mixed else segments[0].drive_name
+        factor, unit = (1e-3, " (mm)") if segments[0].drive_unit == "m" else (1.0, "")
+        out["drive"] = ([c / factor for c in centres], *out["drive"][1:])
+        out["drive_name"] = "stretch - 1, or shear" if mixed else segments[0].drive_name + unit
         out["rest"] = 0.0 if mixed else rest_value(segments[0])
         out["held"] = list(bench.held_out)
         return out
