@@ -10,13 +10,13 @@ from pathlib import Path
 import tissuejax as tj
 from tissuejax.diagnosis.search import Budget
 from tissuejax.diagnosis.specimens import Specimens, brief
-from tissuejax.progress import for_terminal
 from tissuejax.report.diagnosis_page import write_diagnosis
 from tissuejax.report.page import write_figures
 from tissuejax.storage import write_json
 
 ENERGIES = ("demiray",)
 SHOWN = ("demiray", "off_y")
+TRIED = ("anisotropy", "energy-form", "slack", "drift", "permanent-set")
 BUDGET = Budget(most=2, beam=(1, 2), nominees=(6, 3))
 
 
@@ -25,7 +25,7 @@ def main(folder: Path) -> str:
     sample, records = tj.read(folder / "skin.toml"), {}
     for energy in ENERGIES:
         for path in sample.recordings:
-            found = tj.diagnose(sample, energy, holdout=path, budget=BUDGET, progress=for_terminal())
+            found = tj.diagnose(sample, energy, holdout=path, effects=TRIED, budget=BUDGET)
             records[f"{energy}, without {path}"] = brief(found)
             if (energy, path) == SHOWN:
                 write_diagnosis(found, folder / "figures" / "diagnosis", remainders=False)

@@ -15,20 +15,20 @@ import numpy as np
 import tissuejax as tj
 from tissuejax.diagnosis.search import Budget
 from tissuejax.diagnosis.specimens import Specimens, brief
-from tissuejax.progress import for_terminal
 from tissuejax.recordings.recording import Channel, Sample
 from tissuejax.report.diagnosis_page import write_diagnosis
 from tissuejax.report.page import write_figures
 from tissuejax.storage import write_json
 
 SUITED = {
+    "Meunier_2008": ("gent", None),
     "Treloar_1944": ("ogden-3", "mu/alpha"),
     "Kawabata_1981": ("ogden-3", "mu/alpha"),
-    "Meunier_2008": ("gent", None),
 }
 UNSUITED = ("neo-hookean", None)
 SPREAD = 0.03
 HELD, STRICT = "planar", "Meunier_2008"
+TRIED = ("energy-form", "anisotropy", "slack", "platen-friction", "machine-compliance", "drift", "compressibility")
 BUDGET = Budget(most=2, beam=(1, 2), nominees=(6, 3))
 
 
@@ -53,7 +53,7 @@ def main(folder: Path) -> str:
             ("unsuited, spread of sheets", loose, UNSUITED),
             ("suited, reading error", strict, suited),
         )[: 3 if source == STRICT else 1]:
-            found = tj.diagnose(sample, energy, holdout=HELD, ogden_form=form, budget=BUDGET, progress=for_terminal())
+            found = tj.diagnose(sample, energy, holdout=HELD, ogden_form=form, effects=TRIED, budget=BUDGET)
             records[f"{source}, {energy}, {words.split(', ')[1]}"] = brief(found) | {"energy": words.split(",")[0]}
             if source == STRICT:
                 write_diagnosis(
@@ -61,9 +61,9 @@ def main(folder: Path) -> str:
                     folder / "figures" / f"diagnosis-{words.replace(', ', '-').replace(' ', '-')}",
                     remainders=False,
                 )
-    many = Specimens(records)
+        many = Specimens(records)
+        write_json(folder / "diagnosis.json", {"held_out": HELD, "spread": SPREAD, **many.as_dict()})
     write_figures(many, folder / "figures")
-    write_json(folder / "diagnosis.json", {"held_out": HELD, "spread": SPREAD, **many.as_dict()})
     return many.told()
 
 
