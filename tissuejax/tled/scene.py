@@ -117,7 +117,7 @@ class Support(eqx.Module):
         time, displacement: motion of the support, real time, m; None is at rest.
         pattern: factor on the motion by node and axis; None is 1 everywhere.
         compliance: of a tangential bedding: slip per traction, m/Pa; neutral 0 (bonded).
-        fluidity: viscous slip: rate of slip per traction, m/(s Pa); neutral 0 (bonded).
+        fluidity: viscous slip: rate of slip per traction, m/(s Pa); neutral 0 (bonded). Neither has a Coulomb limit.
     """
 
     time: Float[Array, " n"] | None = None
