@@ -15,9 +15,9 @@ class BaseSlip(Effect):
     """Tangential slip of the base: `compliance` times traction at once, plus `fluidity` times traction per second.
 
     Neutral: both 0 (bonded). Reveals: markers that spread sideways, also far from the probe; with fluidity, creep of
-    markers and a residual shift afterwards. Blind: thick tissue over shallow probing, where the base feels nothing. There
-    is no Coulomb limit: the slip is proportional to the traction at any load, so a base that holds up to a threshold
-    and then slides is only met on average.
+    markers and a residual shift afterwards. Blind: thick tissue over shallow probing, where the base feels nothing.
+    There is no Coulomb limit: the slip is proportional to the traction at any load, so a base that holds up to a
+    threshold and then slides is only met on average.
     """
 
     name: ClassVar[str] = "base-slip"
