@@ -1,9 +1,12 @@
 """The noise is told from a mismatch: its correlation is found although the prediction is wrong."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from tissuejax.diagnosis import noise
 from tissuejax.diagnosis.noise import Noise, estimate, portmanteau
 
 
@@ -54,10 +57,10 @@ def test_series_too_short_to_tell_are_taken_as_white():
     assert estimate([np.ones((10, 1))]) == Noise()
 
 
-def test_a_residual_that_is_one_smooth_curve_is_no_numerical_trouble():
-    """Spectra of thirty orders of magnitude drive the optimiser to extremes of its logits."""
-    t = np.linspace(0, 1, 300)
-    for size in (1.0, 1e6, 1e12):
-        found = estimate([(size * (t - 0.3) ** 3)[:, None], (size * np.sin(3 * t))[:, None]])
-        assert 0 <= found.share <= 1
-        assert 0 <= found.rho < 1
+def test_an_optimiser_that_runs_away_is_no_numerical_trouble(monkeypatch):
+    """Where the likelihood is flat its logits drift to thousands; exp of that overflows."""
+    runs = iter([0.0, -100.0, -90.0, -80.0])
+    far = lambda cost, start, **_: SimpleNamespace(x=np.full(len(start), -1e4), fun=next(runs))  # noqa: E731
+    monkeypatch.setattr(noise, "minimize", far)
+    found = estimate([np.zeros((300, 1))])
+    assert (found.share, found.rho) == (0.0, 0.0)
