@@ -9,6 +9,11 @@ from tissuejax.diagnosis.specimens import Specimens
 from tissuejax.report.plot import FAINT, HELD, INK, MODEL, Plot, grid
 
 
+def attempted(record: dict) -> list[str]:
+    """Effects of the best attempt of a specimen that stayed unexplained, whatever their forms."""
+    return list(dict.fromkeys(key.split("/")[0] for key in record["best_attempt"]))
+
+
 class DiagnosisSpecimens(Plot):
     """Left: effects by specimen, the first one found darkest. Right: misfit before and after, over the peak."""
 
@@ -21,9 +26,11 @@ class DiagnosisSpecimens(Plot):
         names, effects = list(subject.records), list(subject.counts)
         if not names:
             return None
+        told = {n: r["effects"] or attempted(r) for n, r in subject.records.items()}
+        effects += [e for e in dict.fromkeys(e for t in told.values() for e in t) if e not in effects]
         rank = np.full((len(names), max(len(effects), 1)), np.nan)
         for i, name in enumerate(names):
-            for order, effect in enumerate(subject.records[name]["effects"]):
+            for order, effect in enumerate(told[name]):
                 rank[i, effects.index(effect)] = order
         errors = [subject.records[n]["rmse_over_peak"] for n in names]
         return {
@@ -42,11 +49,13 @@ class DiagnosisSpecimens(Plot):
     def caption(self, data: dict) -> str:
         """What was found in how many."""
         n = len(data["names"])
-        found = [f"{e} in {int(np.sum(np.isfinite(data['rank'][:, j])))}" for j, e in enumerate(data["effects"])]
+        named = np.array([v in ("found", "ambiguous") for v in data["verdicts"]])
+        counts = [int(np.sum(np.isfinite(data["rank"][named, j]))) for j in range(len(data["effects"]))]
+        found = [f"{e} in {k}" for e, k in zip(data["effects"], counts, strict=True) if k]
         return (
             f"{n} specimens, each diagnosed for itself: {', '.join(found) or 'no effect named'} of {n}. Left: effects "
-            "found, the first one darkest; ? ambiguous, x unexplained. Right: RMSE over peak, base model (grey), with "
-            "the effects (blue fitted, orange held out)."
+            "found, the first one darkest; ? ambiguous, x unexplained (open: the best attempt). Right: RMSE over peak, "
+            "base model (grey), with the effects (blue fitted, orange held out)."
         )
 
     def draw(self, data: dict) -> Figure:
@@ -58,7 +67,9 @@ class DiagnosisSpecimens(Plot):
             for i in range(n):
                 order = data["rank"][i, j]
                 if np.isfinite(order):
-                    left.plot(j, y[i], "s", color=MODEL, alpha=max(1 - 0.3 * order, 0.25), markersize=7)
+                    inside = "none" if data["verdicts"][i] == "unexplained" else MODEL
+                    shade = max(1 - 0.3 * order, 0.25)
+                    left.plot(j, y[i], "s", color=MODEL, markerfacecolor=inside, alpha=shade, markersize=7)
         for i, kind in enumerate(data["verdicts"]):
             mark = {"ambiguous": "?", "unexplained": "x", "nothing-missing": "–"}.get(kind, "")
             left.text(len(data["effects"]) - 0.4, y[i], mark, color=INK, fontsize=8, va="center")
