@@ -73,6 +73,12 @@ class Element(eqx.Module):
         """
 
 
+def parts(x: Float[Array, "..."], axis: int = 0) -> list[Float[Array, "..."]]:
+    """The slices of an array along an axis. Their transpose is one concatenation, where that of indexing pads each
+    slice to the whole array and adds them up: it makes a reverse pass cheaper."""
+    return [jnp.squeeze(part, axis) for part in jax.lax.split(x, (1,) * x.shape[axis], axis)]
+
+
 def determinant(F: Tensor) -> Float[Array, " E"]:
     """J = det F."""
     (a, b, c), (d, e, f), (g, h, i) = F

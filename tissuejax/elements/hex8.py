@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from tissuejax.elements.element import Element, Tensor, barrier, largest_eigenvalue
+from tissuejax.elements.element import Element, Tensor, barrier, largest_eigenvalue, parts
 
 SIGNS = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], float
@@ -40,15 +40,28 @@ class Reference(NamedTuple):
 
 
 def modes(n: Float[Array, "3 8 E"]) -> Float[Array, "7 3 E"]:
-    """Three gradient modes (xi, eta, zeta) and four hourglass modes of nodal vectors."""
-    signs = jnp.asarray(MODES, n.dtype)[:, :, None, None]
-    return sum(signs[:, a] * n[None, :, a] for a in range(8))
+    """Three gradient modes (xi, eta, zeta) and four hourglass modes of nodal vectors: MODES times n, in butterflies."""
+    a, b, c, d, e, f, g, h = parts(n, 1)
+    s0, s1, s2, s3 = b + a, c + d, f + e, g + h  # sums along xi, in the order (eta, zeta) = --, +-, -+, ++
+    d0, d1, d2, d3 = b - a, c - d, f - e, g - h
+    low, high, lower, higher = s1 - s0, s3 - s2, d1 - d0, d3 - d2
+    return jnp.stack(
+        [
+            (d0 + d1) + (d2 + d3), low + high, (s2 + s3) - (s0 + s1),
+            lower + higher, (d2 + d3) - (d0 + d1), high - low, higher - lower,
+        ]
+    )  # fmt: skip
 
 
-def nodal(g: Float[Array, "3 3 E"], h: Any) -> Float[Array, "3 8 E"]:
-    """Nodal vectors of gradient and hourglass modes: the transpose of `modes`."""
-    signs = jnp.asarray(MODES, g.dtype)[:, None, :, None]
-    return sum(signs[k] * g[k][:, None] for k in range(3)) + sum(signs[3 + a] * h[a][:, None] for a in range(4))
+def nodal(g: list[Float[Array, "3 E"]], h: list[Float[Array, "3 E"]]) -> Float[Array, "3 8 E"]:
+    """Nodal vectors of three gradient and four hourglass modes: the transpose of `modes`."""
+    (x, y, z), (p, q, r, w) = g, h
+    a, b, c, d = x - q, p - w, x + q, p + w
+    odd = (a - b, a + b, c - d, c + d)  # what changes sign along xi, in the order (eta, zeta) = --, +-, -+, ++
+    even = (r - y - z, y - r - z, z - y - r, y + r + z)
+    pairs = [(e - o, e + o) for e, o in zip(even, odd, strict=True)]
+    turned = (*pairs[0], *pairs[1][::-1], *pairs[2], *pairs[3][::-1])
+    return jnp.stack(turned, 1)
 
 
 def _cross(a: Float[Array, "3 E"], b: Float[Array, "3 E"]) -> Float[Array, "3 E"]:
@@ -106,23 +119,24 @@ class Hex8(Element):
 
     def gradient(self, reference: Reference, u: Float[Array, "3 8 E"]) -> tuple[Tensor, Any]:
         A, W, X = reference.gradient, reference.bending, reference.hourglass
-        m = barrier(modes(u))
+        m = parts(barrier(modes(u)))
         H = sum(m[k][:, None] * A[k][None] for k in range(3))  # du_i/dX_J
         if W is not None:
             H = H + sum(m[3 + k][:, None] * W[k][None] for k in range(3))
         H = barrier(H)
-        q = m[3:] - sum(X[:, J][:, None] * H[:, J][None] for J in range(3))
+        columns = parts(H, 1)
+        q = jnp.stack([m[3 + a] - sum(X[a, J] * columns[J] for J in range(3)) for a in range(4)])
         return H + jnp.eye(3, dtype=H.dtype)[:, :, None], q
 
     def forces(self, reference: Reference, P: Tensor, memory: Any, stiffness: Float[Array, " E"]) -> Array:
         A, W, X, V = reference.gradient, reference.bending, reference.hourglass, reference.volume
-        h = barrier(reference.stiffening * stiffness * memory)
-        T = barrier(V * P - sum(h[a][:, None] * X[a][None] for a in range(4)))
-        g = barrier(sum(A[:, J][:, None] * T[:, J][None] for J in range(3)))
-        if W is None:
-            return nodal(g, h)
-        bent = barrier(h[:3] + sum(W[:, J][:, None] * T[:, J][None] for J in range(3)))
-        return nodal(g, [*bent, h[3]])
+        h = parts(barrier(reference.stiffening * stiffness * memory))
+        T = parts(barrier(V * P - sum(h[a][:, None] * X[a][None] for a in range(4))), 1)
+        g = parts(barrier(jnp.stack([sum(A[k, J] * T[J] for J in range(3)) for k in range(3)])))
+        if W is not None:
+            bent = barrier(jnp.stack([h[k] + sum(W[k, J] * T[J] for J in range(3)) for k in range(3)]))
+            h = [*parts(bent), h[3]]
+        return nodal(g, h)
 
     def hourglass_energy(self, reference: Reference, memory: Any, stiffness: Float[Array, " E"]) -> Array:
         return 0.5 * jnp.sum(reference.stiffening * stiffness * memory * memory)

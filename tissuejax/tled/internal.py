@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from tissuejax.elements.element import cofactor, determinant
+from tissuejax.elements.element import cofactor, determinant, parts
 from tissuejax.energies.strain import Strain
 from tissuejax.tensors import Sym
 from tissuejax.tled.history import relax
@@ -64,7 +64,7 @@ def take(u: Float[Array, "... N"], cells: Int[Array, "k E"]) -> Float[Array, "..
     fastest, and every later stage would read them with a stride (a tenth of a step)."""
     if u.ndim == 1:
         return u.at[cells].get(mode="promise_in_bounds")
-    return jnp.stack(barrier(tuple(take(row, cells) for row in u)))
+    return jnp.stack(barrier(tuple(take(row, cells) for row in parts(u))))
 
 
 def add(f: Float[Array, "... k E"], cells: Int[Array, "k E"], count: int) -> Float[Array, "... N"]:
@@ -96,7 +96,7 @@ def settled(scene: Scene) -> Float[Array, "3 N"]:
 
 def cauchy_green(F) -> Sym:
     """C = F^T F."""
-    a, b, c = F[:, 0], F[:, 1], F[:, 2]
+    a, b, c = (parts(column) for column in parts(F, 1))
 
     def dot(p, q):
         return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
@@ -108,7 +108,8 @@ def first_piola(F, S):
     """P = F S, (3, 3, E)."""
     xx, yy, zz, xy, xz, yz = S
     rows = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-    return jnp.stack(barrier(tuple(sum(F[:, k] * rows[k][j] for k in range(3)) for j in range(3))), 1)
+    columns = parts(F, 1)
+    return jnp.stack(barrier(tuple(sum(columns[k] * rows[k][j] for k in range(3)) for j in range(3))), 1)
 
 
 def _isochoric_energy(scene: Scene, strain: Strain):
