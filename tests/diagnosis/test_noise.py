@@ -1,5 +1,6 @@
 """The noise is told from a mismatch: its correlation is found although the prediction is wrong."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,6 +9,7 @@ from scipy.signal import lfilter
 
 from tissuejax.diagnosis import noise
 from tissuejax.diagnosis.noise import Noise, estimate, portmanteau
+from tissuejax.diagnosis.quality import Quality
 
 
 def correlated(rng, n, rho):
@@ -64,3 +66,11 @@ def test_an_optimiser_that_runs_away_is_no_numerical_trouble(monkeypatch):
     monkeypatch.setattr(noise, "minimize", far)
     found = estimate([np.zeros((300, 1))])
     assert (found.share, found.rho) == (0.0, 0.0)
+
+
+def test_a_misfit_far_within_the_stated_noise_may_be_smooth():
+    """The spread between specimens bounds a misfit; its correlation is not known."""
+    within = Quality(fitted=0.1, held=0.6, z_fitted=-5.0, z_held=-1.0, z_correlation=9.0)
+    assert within.noise
+    assert not replace(within, fitted=0.9, z_fitted=-0.5).noise, "as large as the noise and smooth is not noise"
+    assert not replace(within, z_held=4.0).noise, "what is held out has to be met too"

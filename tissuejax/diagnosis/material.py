@@ -31,6 +31,7 @@ from tissuejax.recordings.recording import Sample
 
 MEMORIES = ("viscoelasticity", "softening")
 STEP = 1e-6  # of a parameter's scale
+SIZE = 10.0  # by which the base's defaults may be off before they are brought to size
 STRESS = 0.05  # of the largest stress: the least scale of a modulus or an offset
 ADDED = ("effects.drift.", "effects.periodic.")  # added to the stress last: their derivative needs nothing else
 
@@ -120,6 +121,7 @@ class MaterialBench(Bench):
         bench.sizes = sizes
         found = [e for e in entries(sizes) if names is None or e.title in names]
         bench._declare(energy, found)
+        bench._size_up()
         return bench
 
     def _declare(self, energy: Energy, found: list[Entry]) -> None:
@@ -148,6 +150,20 @@ class MaterialBench(Bench):
             self.start.update(start)
             self.candidates.update({c.key: c for c in candidates})
         self._amplitudes = {p for c in self.candidates.values() for p in c.amplitudes}
+
+    def _size_up(self) -> None:
+        """Bring the base's moduli near what the recordings ask for, where defaults are off by more than ten times.
+
+        A descent that starts at soft tissue doesn't find rubber: with a law that ends at a limiting stretch it stops.
+        """
+        rows = self.mask(self.fitted)
+        if not np.any(self.y[rows]):
+            return
+        p = self.predict({}, self.fitted)[rows]
+        ratio = float(p @ self.y[rows] / max(p @ p, 1e-300)) if np.all(np.isfinite(p)) else 1.0
+        if ratio > SIZE or 0 < ratio < 1 / SIZE:
+            for path in self.base:
+                self.start[path] *= ratio if self.free[path].unit == "Pa" else 1.0
 
     def _model(self, values: Mapping[str, float], paths: Sequence[str] = ()) -> tuple[Model, dict]:
         """The model for a set of moving paths, with the places of its values.

@@ -10,6 +10,9 @@ from tissuejax.diagnosis.noise import portmanteau
 from tissuejax.diagnosis.refit import Refit
 
 SIGNIFICANT = 3.5  # standard deviations
+# Chi-square per sample below which the stated noise is no noise but a bound on it (the spread between specimens, say):
+# it says how large a misfit may be and nothing of how it is correlated.
+STATED = 0.5
 TOLERATED = 1.12  # chi-square per sample of a simulation, the numerical error in sigma already
 
 
@@ -42,8 +45,9 @@ class Quality:
         """Whether nothing but noise is left; of simulations, nothing but noise and numerical error."""
         if self.dear:
             return max(self.fitted, self.held if math.isfinite(self.held) else 0.0) < TOLERATED
-        worst = max(self.z_fitted, self.z_held, self.z_correlation)
-        return worst < SIGNIFICANT
+        if self.fitted < STATED:
+            return max(self.z_fitted, self.z_held) < SIGNIFICANT
+        return max(self.z_fitted, self.z_held, self.z_correlation) < SIGNIFICANT
 
 
 def quality(s: Judged, r: Refit) -> Quality:
