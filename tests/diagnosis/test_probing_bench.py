@@ -13,9 +13,7 @@ from tissuejax.diagnosis.refit import refit
 from tissuejax.energies.catalogue import energy
 from tissuejax.recordings.recording import Sample
 
-QUICK = {
-    "mesh": "file", "compression": 3.0, "interval": 0.04, "step": 8e-4, "stiffness_damping": 1e-4, "processes": 1,
-}  # fmt: skip
+QUICK = {"counts": (12, 12, 5), "core": 0.007, "compression": 1.5, "interval": 0.04, "step": 4e-4, "processes": 1}
 TWO = sample(recording("a"), recording("b", place=(-0.004, 0.004), depth=2.5e-3))
 DEPTH = 2e-4
 
@@ -56,24 +54,25 @@ def test_what_acts_in_one_recording_is_run_in_that_one(bench):
 @pytest.mark.parametrize(
     ("path", "step", "more"),
     [
-        ("effects.contact-offset.depth.a", 1e-4, {}),
+        ("effects.contact-offset.depth.a", 3e-4, {}),
         ("effects.machine-compliance.compliance", 5e-4, {}),
-        ("effects.contact-offset.delay", 0.02, {}),
-        ("effects.periodic.sin.a", 1e-4, {"effects.periodic.frequency": 0.9}),
-        ("effects.periodic.frequency", 0.02, {"effects.periodic.sin.a": 3e-4, "effects.periodic.frequency": 0.9}),
+        ("effects.periodic.sin.a", 3e-4, {"effects.periodic.frequency": 0.9}),
+        ("effects.periodic.frequency", 0.05, {"effects.periodic.sin.a": 3e-4, "effects.periodic.frequency": 0.9}),
     ],
 )
 def test_motion_of_probe_support_and_rig_needs_no_run_of_its_own(bench, path, step, more):
-    """The derivative from displaced probes against a central difference of simulations with the effect in."""
+    """The derivative from displaced probes against a difference of simulations with the effect in, while the probe is
+    held: on the way the contact points of a coarse mesh come in one by one."""
     at = VALUES | more
     now = at.get(path, 0.0)
-    low = now - step if path.endswith(("frequency", "delay")) else now
+    low = now if path.endswith("compliance") else now - step  # a rig can't give way against the force
     up, down = bench.runs.many([({**at, path: v}, ("a",), COARSE) for v in (now + step, low)])
-    true = (up - down) / (now + step - low)
     free = probing_free.moving(bench, {path: now} | at, path, ("a",))
-    rows = bench.mask(("a",))
-    error = ((free - true) / bench.sigma)[rows]
-    assert np.linalg.norm(error) < 0.12 * np.linalg.norm((true / bench.sigma)[rows])
+    for s in bench.segments:
+        if s.recording == "a" and s.label == "force z":
+            held = (s.time > 1.2) & (s.time < 1.6)
+            true = ((up - down) / (now + step - low))[s.rows][held]
+            assert np.linalg.norm(free[s.rows][held] - true) < 0.12 * np.linalg.norm(true)
 
 
 def test_sensors_are_blind_to_each_other(bench):
@@ -95,12 +94,15 @@ def test_a_probe_that_is_too_low_is_found_again(bench):
     assert found.chi2 < 1.1 * found.n
 
 
-def test_the_error_of_the_simulation_does_not_explain_a_shift(bench):
+def test_mesh_step_and_penalty_are_told_apart(bench):
+    """Each leaves something open, and together they take up no more of the misfit than there is."""
     misfit = white(bench)
     base = refit(bench, misfit, (), {}, iterations=6, tolerance=5.0)
     found = numerics(bench, misfit, base)
-    assert set(found.rms) == {"mesh", "step", "penalty"}
-    assert not found.enough(base)
+    assert set(found.rms) == {"mesh", "step", "penalty"} == set(found.amplitudes)
+    assert all(0 < found.rms[choice]["force"] < 30 for choice in ("step", "penalty"))
+    assert 0 <= found.gain <= base.chi2
+    assert all(abs(a) <= 1.5 + 1e-9 for a in found.amplitudes.values())
 
 
 def test_a_stopped_diagnosis_finds_its_runs_again(pressed_too_deep, tmp_path):

@@ -166,15 +166,16 @@ def drives(scene: Scene, frames: int) -> Drive:
     clock, probe, support = scene.clock, scene.probe, scene.support
     count = frames * clock.steps
     real = clock.interval / clock.steps
-    centre = stride = motion = None
+    centre = stride = motion = pace = None
     if probe is not None:
         at = clock.start + real * jnp.arange(-1, count + 1)
         path = series(probe.time, probe.position, at)
         path = path if probe.offset is None else path + probe.offset
         centre, stride = path[1:-1], 0.5 * (path[2:] - path[:-2])
     if support.displacement is not None:
-        motion = series(support.time, support.displacement, clock.start + real * jnp.arange(1, count + 1))
-    return Drive(centre, stride, motion)
+        path = series(support.time, support.displacement, clock.start + real * jnp.arange(count + 1))
+        motion, pace = path[1:], (path[1:] - path[:-1]) / clock.step
+    return Drive(centre, stride, motion, pace)
 
 
 def series(time: Float[Array, " n"], values: Float[Array, "n ..."], at: Float[Array, " m"]) -> Float[Array, "m ..."]:

@@ -39,11 +39,13 @@ class State(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """Outside motion of one step: the probe at the step's start, how far it moves per step, the support at its end."""
+    """Outside motion of one step: the probe at the step's start, how far it moves per step, the support at its end, and
+    the support's speed: damping brakes what moves against the support."""
 
     centre: Float[Array, " 3"] | None
     stride: Float[Array, " 3"] | None
     motion: Float[Array, " 3"] | None
+    pace: Float[Array, " 3"] | None = None
 
 
 class Felt(NamedTuple):
@@ -71,9 +73,19 @@ def machine(scene: Scene) -> Machine:
 
 
 def start(m: Machine) -> State:
-    """At rest in the settled shape; where that is no equilibrium (gravity switched on), half a step of speed behind."""
+    """At rest in the settled shape; where that is no equilibrium (gravity switched on), half a step of speed behind.
+
+    On a moving support the tissue has moved along before the clock begins: it starts with the support's place, speed.
+    """
     scene, u = m.scene, internal.settled(m.scene)
     v = jnp.zeros_like(u)
+    if scene.support.displacement is not None and scene.support.pattern is None:
+        clock, path = scene.clock, scene.support
+        real = clock.step * clock.compression
+        at = clock.start + real * jnp.arange(2)
+        place = jnp.stack([jnp.interp(at, path.time, x) for x in path.displacement.T]).astype(u.dtype)
+        u = u + place[:, :1]
+        v = v + (place[:, 1:] - place[:, :1]) / clock.step
     if m.weight is not None and scene.body.settled is None:
         v = jnp.where(m.hold.held, 0.0, -0.5 * scene.clock.step * m.weight / m.mass)
     grip = None if scene.probe is None else contact.untouched(scene.probe)
@@ -112,7 +124,9 @@ def advance(m: Machine, state: State, drive: Drive) -> tuple[State, Felt]:
         felt = None if felt is None else felt + FEEL * (force - felt)
     f = outer - inner
     half = 0.5 * settings.mass_damping * h
-    pushed = ((1.0 - half) * v + h * f / m.mass) / (1.0 + half)
+    driven = (1.0 - half) * v + h * f / m.mass
+    driven = driven if drive.pace is None else driven + 2.0 * half * drive.pace[:, None]
+    pushed = driven / (1.0 + half)
     slip = support.slide(scene, m.hold, state.slip, f, m.mass) if support.slips(scene) else state.slip
     moved = u + h * pushed
     moved = jnp.where(m.hold.held, support.target(scene, m.hold, slip, drive.motion), moved)
