@@ -202,8 +202,17 @@ class MaterialBench(Bench):
         model, sources = self._model(values)
         out = self.y.copy()
         for name in recordings or self._tests:
-            self._put(out, name, np.asarray(_predict(model, self._theta(sources, values, name), self._tests[name])))
+            self._put(out, name, self._run(model, self._theta(sources, values, name), name))
         return out
+
+    def _run(self, model: Model, theta: Float[np.ndarray, " p"], name: str) -> Float[np.ndarray, "n ..."]:
+        """One prediction; NaN where the faces of a specimen could not be found at such parameters."""
+        try:
+            return np.asarray(_predict(model, theta, self._tests[name]))
+        except (ValueError, RuntimeError) as error:  # raised inside the compiled program by its linear solver
+            if "non-finite" not in str(error):
+                raise
+            return np.full_like(self._tests[name].drive, np.nan)
 
     def _put(self, out: Float[np.ndarray, " N"], name: str, stress: Float[np.ndarray, "n ..."]) -> None:
         for s in self._of[name]:
@@ -228,7 +237,7 @@ class MaterialBench(Bench):
                     ends.append([t.tobytes() for t in two])
                     if ends[-1][0] != ends[-1][1]:
                         thetas.update(zip(ends[-1], two))
-                known = {k: np.asarray(_predict(model, t, self._tests[name])) for k, t in thetas.items()}
+                known = {k: self._run(model, t, name) for k, t in thetas.items()}
                 for i, (before, after) in zip(members, ends):
                     if before != after:
                         self._put(out[i], name, known[after] - known[before])
