@@ -84,6 +84,12 @@ class DiagnosisSpecimens(Plot):
             values = 100 * data[f"{when}_{role}"]
             right.plot(values, y, "o", color=colour, markersize=4)
         right.set_xscale("log")
+        low, high = right.get_xlim()
+        ticks = [v for v in (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50) if low <= v <= high]
+        right.set_xticks(ticks, [f"{v:g}" for v in ticks])
+        right.minorticks_off()
+        for ax in (left, right):
+            ax.set_ylim(-0.7, n - 0.3)
         right.set_yticks(y, [])
         right.set_xlabel("RMSE over peak, %")
         return figure
