@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from spring_bench import spring
 
+from tissuejax.diagnosis import material
 from tissuejax.diagnosis.diagnose import diagnose
-from tissuejax.diagnosis.search import Budget, search
+from tissuejax.diagnosis.material import MaterialBench
+from tissuejax.diagnosis.search import Budget, search, surprise
+from tissuejax.energies.catalogue import energy
 from tissuejax.errors import InputError, NotConverged
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
@@ -68,3 +71,29 @@ def test_a_base_model_that_cannot_be_fitted_at_all():
     bench.predict = lambda values, recordings=None: np.full(len(bench.y), np.nan)
     with pytest.raises(NotConverged, match="name another --energy"):
         search(bench)
+
+
+def test_parameters_at_which_the_faces_cannot_be_found_are_impossible(monkeypatch):
+    made = sample()
+    bench = MaterialBench.of(made, energy("neo-hookean"), ("r1",), ("r2",), dict.fromkeys(made.recordings, 2.0))
+
+    def stops(*_):
+        raise ValueError("A linear solver received non-finite (NaN or inf) input")
+
+    monkeypatch.setattr(material, "_predict", stops)
+    assert np.isnan(bench.predict({"energy.mu": 500.0})).all()
+
+    def fails(*_):
+        raise ValueError("another thing")
+
+    monkeypatch.setattr(material, "_predict", fails)
+    with pytest.raises(ValueError, match="another thing"):
+        bench.predict({})
+
+
+def test_surprise_is_chi_square_at_noise_and_grows_slowly_beyond():
+    assert surprise(90.0, 100) == 90.0
+    assert surprise(100.0, 100) == 100.0
+    # at its best v = chi2/n: n (log v + 1), by hand for a misfit e times the noise's variance
+    assert surprise(100 * np.e, 100) == pytest.approx(200.0)
+    assert surprise(0.0, 0) == 0.0
