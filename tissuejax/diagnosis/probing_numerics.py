@@ -58,7 +58,7 @@ def numerics(bench: ProbingBench, misfit: Misfit, at: Refit) -> Numerics:
     fine, rough = ready[FINE].settings, ready[COARSE].settings
     finer = fine.counts[0] / rough.counts[0]
     varied = {
-        "mesh": (rough.changed(counts=fine.counts), 1 / (finer**2 - 1)),
+        "mesh": (rough.changed(counts=fine.counts), 1 / (finer**2 - 1) if finer > 1 else 0.0),
         "step": (rough.changed(compression=fine.compression), 1 / ((rough.compression / fine.compression) ** 2 - 1)),
         "penalty": (rough.changed(penalty=2 * rough.penalty), 2.0),
     }
