@@ -4,8 +4,8 @@ import tissuejax as tj
 found = tj.fit("sample.h5", energy="reduced-polynomial-2", holdout=["r3"])
 
 The verbs (`read`, `material`, `fit`, `diagnose`, `write`, `sensitivity`, `catalogue`) load on first use, so that
-importing a single module of the package stays cheap. Rooms are imported by their path, `from
-tissuejax.energies.strain import Strain`.
+importing a single module of the package stays cheap. Rooms are imported by their path,
+`from tissuejax.energies.strain import Strain`.
 """
 
 import importlib
