@@ -72,7 +72,16 @@ def test_files_hold_recordings_and_no_truth(challenge):
 def test_making_again_is_free_and_another_one_is_refused(challenge):
     assert make(challenge, "material", 6, seed=4) == read_manifest(challenge)
     with pytest.raises(InputError, match="another challenge"):
-        make(challenge, "material", 7, seed=4)
+        make(challenge, "material", 6, seed=5)
+    with pytest.raises(InputError, match="as many or more"):
+        make(challenge, "material", 5, seed=4)
+
+
+def test_a_larger_count_fills_up_and_leaves_the_cases_that_are_there(tmp_path):
+    few = make(tmp_path, "material", 2, seed=8)
+    more = make(tmp_path, "material", 3, seed=8)
+    assert more["cases"][:2] == few["cases"] and len(more["cases"]) == 3
+    assert more["keys_sha256"] != few["keys_sha256"]
 
 
 def test_changed_keys_are_not_graded(tmp_path):
