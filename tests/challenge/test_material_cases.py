@@ -80,7 +80,8 @@ def test_making_again_is_free_and_another_one_is_refused(challenge):
 def test_a_larger_count_fills_up_and_leaves_the_cases_that_are_there(tmp_path):
     few = make(tmp_path, "material", 2, seed=8)
     more = make(tmp_path, "material", 3, seed=8)
-    assert more["cases"][:2] == few["cases"] and len(more["cases"]) == 3
+    assert more["cases"][:2] == few["cases"]
+    assert len(more["cases"]) == 3
     assert more["keys_sha256"] != few["keys_sha256"]
 
 
