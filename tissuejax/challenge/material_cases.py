@@ -15,6 +15,7 @@ from tissuejax.errors import NotConverged
 
 CATEGORIES = ("none", "one", "two", "three", "unknown")
 SHARES = (0.20, 0.45, 0.14, 0.06, 0.15)
+NOMINAL = next(c for c in CATALOGUED if c.name == "viscoelasticity" and c.law == "nominal")
 ALIKE = ({"slack", "machine-compliance"}, {"anisotropy", "aging"}, {"compressibility", "platen-friction"})
 
 
@@ -82,7 +83,13 @@ def choices(rng: np.random.Generator, kind: str, turn: int) -> list[Choice]:
         weights = np.array([2.0 if c.plain else 1.0 for c in laws])
         found.append(laws[int(rng.choice(len(laws), p=weights / weights.sum()))])
     fibres = any(c.name == "anisotropy" for c in found)
-    return [replace(c, law="nominal") if fibres and c.law in ("pk2", "spectrum", "strained") else c for c in found]
+    # relaxation beside fibres acts on the nominal stress: a spectrum, which has no such form, becomes a Prony series
+    return [
+        (NOMINAL if c.law == "spectrum" else replace(c, law="nominal"))
+        if fibres and c.law in ("pk2", "spectrum", "strained")
+        else c
+        for c in found
+    ]
 
 
 def draw(name: str, seed: int, index: int, kind: str | None = None, turn: int | None = None) -> Case:
