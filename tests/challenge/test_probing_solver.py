@@ -140,3 +140,18 @@ def test_indentation_converges_to_another_solver():
     assert coarse.max() < 0.07
     assert fine.max() < 0.033
     assert np.all(fine < 0.6 * coarse)
+
+
+def test_a_sliding_probe_drags_with_friction_times_pressure():
+    """Dragged until all of the contact slides, tangential over normal force is Coulomb's coefficient (flat surface)."""
+    mesh = cylinder(9, 3)
+    near = np.linalg.norm(mesh.points[mesh.top].mean(1)[:, :2], axis=1) < 0.01
+    forces = {}
+    for mu in (0.0, 0.2):
+        bench = Bench(Solid(mesh, Tissue(781.9, 0, 2e4)), Sphere(mesh, mesh.top[near], 4.75e-3, mu), Bed())
+        top = 0.02 + 4.75e-3
+        way = [[0, 0, top + 1e-4], [0, 0, top - 4e-4], [0, 0, top - 8e-4]]
+        way += [[x, 0, top - 8e-4] for x in (5e-4, 1e-3)]
+        forces[mu] = bench.follow(np.arange(len(way)), np.array(way))[0]
+    drag = forces[0.0][-1, 0] - forces[0.2][-1, 0]  # facets are not level, so some lateral force is there without
+    assert drag / forces[0.2][-1, 2] == pytest.approx(0.2, rel=0.1)

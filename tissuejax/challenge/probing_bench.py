@@ -13,8 +13,18 @@ from tissuejax.challenge.quasistatic import Bed, Bench
 from tissuejax.challenge.solid import Solid, Tissue
 from tissuejax.challenge.touch import Membrane, Sphere
 
-MESH = (16, 16, 6)
+MESH = (14, 14, 6)
 STRIDE = 5e-4
+SENSED = {
+    "drift",
+    "clock-lag",
+    "aging",
+    "machine-compliance",
+    "rubbing",
+    "warmed",
+    "saturated",
+    "cured",
+}  # no new solve
 FORCE_RATE, MARKER_RATE, PROBE_RATE = 62.5, 15.0, 100.0
 
 
@@ -55,6 +65,7 @@ def record(
     clock: tuple[float, float],
     phase: float,
     mesh: tuple[int, int, int] = MESH,
+    solved: dict | None = None,
 ) -> Record:
     """Solve one recording without noise.
 
@@ -65,6 +76,7 @@ def record(
         clock: start of this recording and of the last one, s.
         phase: of a moving support in this recording.
         mesh: hexes along each direction.
+        solved: what was solved before for the same paths: effects that only sensors feel find it there.
     """
     have = {i.name: i for i in ingredients}
     support = supported(have, path, phase)
@@ -77,15 +89,20 @@ def record(
     def motion(t: np.ndarray) -> np.ndarray:
         return path.at(t) + offset - support(t)
 
-    bench, watch = assembled(lobe, tissue, have, site, sites, radius, places, motion(path.time), mesh)
     history = bool(set(have) & {"viscoelasticity"}) or "periodic" in have
     every = 0.12 if "periodic" in have else 0.8 if history else None
     at, pieces = stops(path, motion, lobe, radius, 0.7 * STRIDE if history else STRIDE, every)
-    where = motion(at)
-    close = gap(lobe, where, radius) < (1e-3 if "adhesion" in have else 1e-4)
-    force, moved = np.zeros((len(at), 3)), np.zeros((len(at), len(places), 3))
-    if close.any():
-        force[close], moved[close] = bench.follow(at[close], where[close], watch)
+    solved = {} if solved is None else solved
+    same = number, tuple((i.name, i.amount) for i in ingredients if i.name not in SENSED)
+    if same not in solved:
+        where = motion(at)
+        close = gap(lobe, where, radius) < (1e-3 if "adhesion" in have else 1e-4)
+        force, moved = np.zeros((len(at), 3)), np.zeros((len(at), len(places), 3))
+        if close.any():
+            bench, watch = assembled(lobe, tissue, have, site, sites, radius, places, motion(path.time), mesh)
+            force[close], moved[close] = bench.follow(at[close], where[close], watch)
+        solved[same] = force, moved
+    force, moved = solved[same]
     rest = lobe.point(*np.array(places).T, np.ones(len(places)))
     end = path.time[-1]
     time, ft, mt = (np.arange(a / r, end, 1 / r) for a, r in ((0, PROBE_RATE), (0.25, FORCE_RATE), (0.3, MARKER_RATE)))
@@ -128,6 +145,8 @@ def assembled(lobe, tissue, have, site, sites, radius, places, way, mesh) -> tup
         tissue = replace(tissue, g=(i.amount * split, i.amount * (1 - split)), tau=tuple(i.shape["tau"]))
     if "softening" in have:
         tissue = replace(tissue, damage=have["softening"].amount, damage_energy=have["softening"].shape["energy"])
+    if "energy-form" in have:
+        tissue = replace(tissue, C30=have["energy-form"].amount)
     if "anisotropy" in have:
         tissue = replace(tissue, fibre=have["anisotropy"].amount, along=tuple(have["anisotropy"].shape["along"]))
     fine = 0.14 if radius > 0.007 else 0.1

@@ -117,19 +117,36 @@ def _draw(name: str, rng: np.random.Generator, kind: str, turn: int, mesh: tuple
     noise = (0.003, float(np.round(rng.uniform(50e-6, 85e-6), 6)))
     rho = float(rng.uniform(0.4, 0.85)) if rng.random() < 0.3 else 0.0
 
-    def recorded(ingredients: list[Ingredient]) -> list[Record]:
+    solved: dict = {}
+
+    def recorded(ingredients: list[Ingredient], count: int = 3) -> list[Record]:
+        clocks = [(start, starts[-1]) for start in starts]
         return [
-            record(lobe, tissue, ingredients, p, s, sites, radius, places, i, (starts[i], starts[-1]), phases[i], mesh)
-            for i, (p, s) in enumerate(zip(paths, sites))
+            record(
+                lobe,
+                tissue,
+                ingredients,
+                paths[i],
+                sites[i],
+                sites,
+                radius,
+                places,
+                i,
+                clocks[i],
+                phases[i],
+                mesh,
+                solved,
+            )
+            for i in range(count)
         ]
 
     clean = recorded(added)
     sizes = {}
     if added:
-        bare = recorded([])
+        bare = recorded([], 2)
         for one in added:
-            alone = clean if len(added) == 1 else recorded([one])
-            sizes[one.name] = beyond(bare[:2], alone[:2], noise)
+            alone = clean[:2] if len(added) == 1 else recorded([one], 2)
+            sizes[one.name] = beyond(bare, alone, noise)
     noisy, errors = [], {}
     for r in clean:
         e = np.stack([correlated(rng, len(r.force), rho) for _ in range(3)], -1)

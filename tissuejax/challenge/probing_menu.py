@@ -88,6 +88,7 @@ CATALOGUED = (
     Course("clock-lag", lambda r, c: (_log(r, 0.04, 0.25) * r.choice([-1.0, 1.0]), {})),
     Course("aging", lambda r, c: (_log(r, 0.03, 0.3) * r.choice([-1.0, 1.0]), {})),
     Course("anisotropy", lambda r, c: (_log(r, 0.5, 6) * c, {"along": [*_turn(r), 0.0]}), solved=True),
+    Course("energy-form", lambda r, c: (_log(r, 1, 10) * c, {}), solved=True),
 )
 
 STRAY = (

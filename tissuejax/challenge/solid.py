@@ -91,17 +91,24 @@ class Solid:
             self.factor = np.ones((E, 8))
         self.mean_factor = (self.factor * self.w).sum(1) / self.V
         self._f, self._w = self.factor.ravel(), self.w.ravel()
+        self._left = np.ascontiguousarray(self.G.reshape(E, 8, 8, 3).transpose(0, 2, 1, 3).reshape(E, 8, 24))  # a (q j)
+        self._G32, self._w32 = self.G.astype(np.float32), self._w.astype(np.float32)
+        self._left32 = self._left.astype(np.float32)
 
     def state(self, u: Float[np.ndarray, "N 3"], dt: float, tangent: bool) -> dict:
-        """Forces (E, 8, 3), tangents (E, 8, 3, 8, 3) if asked for, energy, and what a step would leave behind."""
+        """Forces (E, 8, 3), tangents (E, 8, 3, 8, 3) if asked for, energy, and what a step would leave behind.
+
+        Tangents are in single precision: they only steer Newton's method, whose residual is in double.
+        """
         t = self.tissue
         n, E = len(self._w), len(self.V)
         x = (self.grid.points + u)[self.grid.cells]
-        F = np.swapaxes(np.repeat(x, 8, 0).reshape(n, 8, 3), 1, 2) @ self.G
-        J = np.linalg.det(F)
+        F = (np.swapaxes(x, 1, 2) @ self._left).reshape(E, 3, 8, 3).transpose(0, 2, 1, 3).reshape(n, 3, 3)
+        cof = _cofactors(F)
+        J = np.einsum("ni,ni->n", F[:, 0], cof[:, 0])
         if J.min() <= 0.02:
             return {"bad": True}
-        Fit = np.swapaxes(np.linalg.inv(F), 1, 2)
+        Fit = cof / J[:, None, None]
         I = np.einsum("nij,nij->n", F, F)
         thin = J ** (-2 / 3)
         y = thin * I - 3
@@ -113,10 +120,12 @@ class Solid:
         P = w1[:, None, None] * H
         A = None
         if tangent:
-            A = _outer(w2[:, None, None] * H, H)
-            k = 2 * w1 * thin
-            A -= _outer((2 / 3 * k)[:, None, None] * Fit, F) + _outer((2 / 3 * k)[:, None, None] * D, Fit)
-            A += (k * I / 3)[:, None, None, None, None] * np.einsum("nil,nkj->nijkl", Fit, Fit)
+            F4, Fit4, D4, H4 = (_single(x) for x in (F, Fit, D, H))
+            A = _outer(_single(w2)[:, None, None] * H4, H4)
+            k = _single(2 * w1 * thin)
+            A -= _outer(np.float32(2 / 3) * k[:, None, None] * Fit4, F4)
+            A -= _outer(np.float32(2 / 3) * k[:, None, None] * D4, Fit4)
+            A += _crossed(_single(k * I / 3)[:, None, None] * Fit4, Fit4)
             A[:, [0, 0, 0, 1, 1, 1, 2, 2, 2], [0, 1, 2] * 3, [0, 0, 0, 1, 1, 1, 2, 2, 2], [0, 1, 2] * 3] += k[:, None]
         if t.fibre:
             a = np.asarray(t.along) / np.linalg.norm(t.along)
@@ -126,9 +135,10 @@ class Solid:
             P = P + (2 * t.fibre * self._f * e)[:, None, None] * Fa[:, :, None] * a
             W = W + t.fibre / 2 * self._f * e**2
             if tangent:
-                B = Fa[:, :, None] * a
-                A += _outer((4 * t.fibre * self._f * on)[:, None, None] * B, B)
-                A += (2 * t.fibre * self._f * e)[:, None, None, None, None] * np.einsum("ik,j,l->ijkl", np.eye(3), a, a)
+                B = _single(Fa[:, :, None] * a)
+                A += _outer(_single(4 * t.fibre * self._f * on)[:, None, None] * B, B)
+                along = _single(np.einsum("ik,j,l->ijkl", np.eye(3), a, a))
+                A += _single(2 * t.fibre * self._f * e)[:, None, None, None, None] * along
         left = {"W": W}
         if t.damage:
             top = np.maximum(self.past.top if self.past.top is not None else 0 * W, W)
@@ -136,7 +146,7 @@ class Solid:
             eta = 1 - t.damage * np.tanh(arg)
             if tangent:
                 slope = np.where(arg > 0, t.damage / t.damage_energy / np.cosh(np.minimum(arg, 50)) ** 2, 0.0)
-                A = eta[:, None, None, None, None] * A + _outer(slope[:, None, None] * P, P)
+                A = _single(eta)[:, None, None, None, None] * A + _outer(_single(slope[:, None, None] * P), _single(P))
             P = eta[:, None, None] * P
             left["top"] = top
         if t.g:
@@ -144,7 +154,7 @@ class Solid:
             c, S0, keep = self._relaxed(S, dt)
             P = c * P + F @ S0
             if tangent:
-                A = c * A
+                A = np.float32(c) * A
                 for i in range(3):
                     A[:, i, :, i, :] += np.swapaxes(S0, 1, 2)
             left |= keep
@@ -155,31 +165,29 @@ class Solid:
             c, p, keep = self._leaked(p, dt)
             cp = np.array([c])
             left |= keep
-        cof = J[:, None, None] * Fit
         p8 = np.repeat(p, 8)
         P = P + p8[:, None, None] * cof
         Pw = P * self._w[:, None, None]
-        f = np.einsum("eqij,eqaj->eai", Pw.reshape(E, 8, 3, 3), self.G.reshape(E, 8, 8, 3))
-        left["f"] = f
+        left["f"] = self._left @ Pw.reshape(E, 8, 3, 3).transpose(0, 1, 3, 2).reshape(E, 24, 3)
         left["energy"] = float(np.sum(W * self._w) + np.sum(self.V * t.K * self.mean_factor * (Jm - 1) ** 2) / 2)
         if tangent:
-            A += (p8 * J)[:, None, None, None, None] * (
-                Fit[:, :, :, None, None] * Fit[:, None, None] - np.einsum("nil,nkj->nijkl", Fit, Fit)
-            )
+            scaled = _single(p8 * J)[:, None, None] * Fit4
+            A += _outer(scaled, Fit4)
+            A -= _crossed(scaled, Fit4)
             left["K"] = self._stiffness(A, cof, cp * t.K * self.mean_factor / self.V)
         return left
 
     def _stiffness(self, A: np.ndarray, cof: np.ndarray, bulk: np.ndarray) -> np.ndarray:
         E = len(self.V)
-        A = A * self._w[:, None, None, None, None]
-        right = A.reshape(-1, 27, 3) @ np.swapaxes(self.G, 1, 2)  # (i j k) b
+        A *= self._w32[:, None, None, None, None]
+        right = A.reshape(-1, 27, 3) @ np.swapaxes(self._G32, 1, 2)  # (i j k) b
         right = right.reshape(E, 8, 3, 3, 24).transpose(0, 1, 3, 2, 4).reshape(E, 24, 72)  # (q j) (i k b)
-        left = self.G.reshape(E, 8, 8, 3).transpose(0, 2, 1, 3).reshape(E, 8, 24)  # a (q j)
-        K = (left @ right).reshape(E, 8, 3, 3, 8).transpose(0, 1, 2, 4, 3).copy()  # a i b k
+        K = (self._left32 @ right).reshape(E, 8, 3, 3, 8).transpose(0, 1, 2, 4, 3).copy()  # a i b k
         weighted = (cof * self._w[:, None, None]).reshape(E, 8, 3, 3)
-        b = np.einsum("eqij,eqaj->eai", weighted, self.G.reshape(E, 8, 8, 3)).reshape(E, 24)
+        b = (self._left @ weighted.transpose(0, 1, 3, 2).reshape(E, 24, 3)).reshape(E, 24)
         K = K.reshape(E, 24, 24)
-        K += bulk[:, None, None] * b[:, :, None] * b[:, None, :]
+        b = _single(b)
+        K += (_single(bulk)[:, None, None] * b[:, :, None]) * b[:, None, :]
         return K
 
     def _relaxed(self, S: np.ndarray, dt: float) -> tuple[float, np.ndarray, dict]:
@@ -207,6 +215,24 @@ class Solid:
         for name in ("S", "h", "top", "p", "hp"):
             if name in left:
                 setattr(self.past, name, left[name])
+
+
+def _cofactors(F: np.ndarray) -> np.ndarray:
+    """J F^-T: rows are cross products of the other two rows."""
+    x, y, z = F[:, 0], F[:, 1], F[:, 2]
+
+    def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
+
+    return np.stack([cross(y, z), cross(z, x), cross(x, y)], 1)
+
+
+def _single(a: np.ndarray) -> np.ndarray:
+    return np.asarray(a, np.float32)
+
+
+def _crossed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[:, :, None, None, :] * b.transpose(0, 2, 1)[:, None, :, :, None]
 
 
 def _outer(a: np.ndarray, b: np.ndarray) -> np.ndarray:

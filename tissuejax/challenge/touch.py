@@ -13,7 +13,8 @@ from jaxtyping import Float, Int
 from tissuejax.challenge.lobe import Grid
 
 PENALTY = 5e8  # Pa/m: 3 kPa sinks in 6 micrometres
-STICK = 1e8  # Pa/m
+STICK = 3e7  # Pa/m: 300 Pa of friction give way by 10 micrometres before they slide
+ALONG = (0.05, 0.3, 1.0)  # of the secant stiffness along sliding: the true one is nothing, and may chatter
 
 
 def facet_points(order: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -32,6 +33,7 @@ class Sphere:
 
     Attributes:
         friction: Coulomb's coefficient.
+        caution: which of `ALONG` steers Newton's method.
         pull: largest adhesive traction, Pa; `range` the gap at which it acts, m.
     """
 
@@ -44,6 +46,7 @@ class Sphere:
     slip: np.ndarray | None = None
     last: np.ndarray | None = None
     touched: np.ndarray | None = field(default=None)
+    caution: int = 0
 
     def __post_init__(self):
         self.N, dN, w = facet_points(3)
@@ -88,8 +91,12 @@ class Sphere:
             left["slip"] = share[..., None] * trial
             t = t + STICK * left["slip"]
             if tangent:
+                # symmetric part of the consistent tangent (the rest, friction that grows with pressure, is left to
+                # the iteration): none along the direction of sliding
                 stiff = np.where(pressure > 0, STICK * share, 0.0)
-                K = K + stiff[..., None, None] * across
+                way = trial / np.maximum(size, 1e-30)[..., None]
+                less = np.where(slides, (1 - ALONG[self.caution]) * stiff, 0.0)
+                K = K + stiff[..., None, None] * across - less[..., None, None] * way[..., :, None] * way[..., None, :]
         weighted = t * self.area[..., None]
         left["f"] = np.einsum("qa,fqd->fad", self.N, weighted)
         left["probe"] = weighted.sum((0, 1))
