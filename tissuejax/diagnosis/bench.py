@@ -51,7 +51,8 @@ class Free:
         lower, upper: range allowed in a fit.
         scale: typical step.
         log: fitted as its logarithm (positive over decades: times, rates, periods).
-        prior: (mean, standard deviation) or None.
+        prior: (mean, standard deviation) or None, of the logarithm where that is fitted.
+        limited: True where a fit that rests on the upper limit has run away and is not to be believed.
     """
 
     lower: float
@@ -60,6 +61,7 @@ class Free:
     unit: str = "1"
     log: bool = False
     prior: tuple[float, float] | None = None
+    limited: bool = False
 
 
 @dataclass(frozen=True)
@@ -148,6 +150,14 @@ class Bench(abc.ABC):
     def settings(self, candidate: Candidate, prediction: Float[np.ndarray, " N"]) -> Sequence[Mapping[str, float]]:
         """Shapes at which to score a candidate; a bench may read some from the residual (a period, a place)."""
         return candidate.grid
+
+    def mirrored(self, values: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
+        """Changes of `values` that many sets of recordings don't see (a direction turned into its mirror image)."""
+        return ()
+
+    def told(self) -> str:
+        """All that a prediction depends on beside the parameters, as text: what is kept of it carries its hash."""
+        return ""
 
     def burden(self, keys: Sequence[str]) -> int:
         """How many searches and memories a prediction with these candidates nests; sets of many are not tried."""

@@ -9,7 +9,7 @@ effect is called to help.
 import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -32,6 +32,8 @@ from tissuejax.model import Model
 from tissuejax.parameters import Parameter
 
 MOST = 24  # settings of one candidate's shapes at most
+ENERGY_FORM = EnergyForm(terms=("C30", "C01", "C02", "exponential", "ogden"))
+SPARE = EnergyForm(terms=("C30", "C01", "C02", "exponential"))  # principal stretches cost as much as all the rest
 DEAR = ("machine-compliance", "nonlinear-viscosity", "compressibility")  # a search inside every prediction
 
 
@@ -46,6 +48,8 @@ class Form:
         nominated: False for forms that are only reached from a neighbour.
         each: parameters with a value of their own in every recording.
         reach: how many times beyond the values scanned (or the default) a positive shape may go.
+        most: limits of exponents, which run away where the fitted recordings hardly reach them.
+        beside: names of forms that it is tried beside, whatever the order.
     """
 
     name: str
@@ -54,15 +58,22 @@ class Form:
     nominated: bool = True
     each: tuple[str, ...] = ()
     reach: float = 10.0
+    most: Mapping[str, float] = field(default_factory=dict)
+    beside: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Entry:
-    """An effect with its forms, spare to rich, and the name under which it is reported."""
+    """An effect with its forms, spare to rich, and the name under which it is reported.
+
+    Attributes:
+        spare: the effect without what makes every prediction dear, for sets that don't use that.
+    """
 
     effect: Effect
     forms: tuple[Form, ...]
     title: str
+    spare: Effect | None = None
 
     @property
     def dear(self) -> bool:
@@ -87,6 +98,8 @@ class Entry:
                     held += [f"{prefix}.{name}.{r}" for r in held_out]
                 for path in (*own, *(h for h in held if h.startswith(f"{prefix}.{name}."))):
                     free[path] = limits(p, shape, form.grid.get(name, self.effect.grid.get(name, ())), form.reach)
+                    if name in form.most:
+                        free[path] = held_in(free[path], form.most[name])
                     start[path] = float(self.effect.neutral[name])
             candidates.append(
                 Candidate(
@@ -106,8 +119,10 @@ class Entry:
 
     def near(self, i: int, j: int) -> bool:
         """Whether forms i and j are tried beside each other: next in the order, or one freeing all the other frees."""
-        a, b = (set(self.forms[k].free) for k in (i, j))
-        return i != j and (abs(i - j) == 1 or a < b or b < a)
+        one, other = self.forms[i], self.forms[j]
+        a, b = set(one.free), set(other.free)
+        told = one.name in other.beside or other.name in one.beside
+        return i != j and (abs(i - j) == 1 or a < b or b < a or told)
 
 
 def settings(grid: Mapping[str, tuple[float, ...]], paths: Mapping[str, list[str]]) -> tuple[dict[str, float], ...]:
@@ -129,6 +144,14 @@ def limits(p: Parameter, shape: bool, grid: tuple[float, ...], reach: float = 10
     return Free(lower, upper, p.typical, p.unit, log=log)
 
 
+def held_in(f: Free, most: float) -> Free:
+    """`f` with a limit (both ways if it has a sign); a positive one drawn weakly, a factor of 5, to a tenth of it."""
+    if not f.log:
+        return replace(f, lower=-most, upper=most, limited=True)
+    return replace(f, upper=most, lower=min(f.lower, 1e-3 * most), prior=(math.log(most / 10), SPREAD), limited=True)
+
+
+SPREAD = math.log(5.0)
 TIMES = tuple(float(t) for t in np.geomspace(0.1, 60.0, 7))
 
 
@@ -156,6 +179,8 @@ def entries(sizes: Sizes) -> list[Entry]:
     pairs = {"tau1": (0.2, 0.6, 2.0), "tau2": (4.0, 12.0, 40.0)}
     damage = {"m": tuple(sizes.energy * x for x in (0.02, 0.1, 0.4))}
     exponent = {"exponent": tuple(x / sizes.strain**2 for x in (0.3, 1.5))}
+    steepest = {"exponent": 4 / sizes.strain**2}  # e^12 at the largest strain: I1bar - 3 is about 3 strain^2
+    fibres = 10 / math.expm1(2 * sizes.strain) ** 2  # e^10 at the largest stretch
     special = {
         "viscoelasticity": (
             Viscoelasticity(terms=3),
@@ -231,19 +256,18 @@ def entries(sizes: Sizes) -> list[Entry]:
         "anisotropy": (  # along an axis of the test an angle has no slope to leave it by
             Anisotropy(),
             (
-                # skin stiffens with exponents of some tens
                 Form(
                     "in the xy plane",
                     ("k1", "k2", "angle"),
-                    {"angle": tuple(0.15 + np.arange(4) * np.pi / 4)},
-                    reach=100.0,
+                    {"angle": tuple(0.15 + np.arange(4) * np.pi / 4), "k2": (min(1.0, fibres / 10),)},
+                    most={"k2": fibres},
                 ),
                 Form(
                     "any direction",
                     ("k1", "k2", "angle", "elevation"),
                     {"elevation": (0.8, -0.8)},
                     nominated=False,
-                    reach=100.0,
+                    most={"k2": fibres},
                 ),
             ),
         ),
@@ -268,13 +292,21 @@ def entries(sizes: Sizes) -> list[Entry]:
             ),
         ),
         "energy-form": (
-            EnergyForm(terms=("C30", "C01", "C02", "exponential")),
+            ENERGY_FORM,
             (
                 Form("cubic", ("C30",), {}),
                 Form("second invariant", ("C01",), {}),
-                Form("exponential", ("exponential", "exponent"), exponent),
+                Form("exponential", ("exponential", "exponent"), exponent, most=steepest),
                 Form("cubic and second invariant", ("C30", "C01"), {}, nominated=False),
-                Form("all", ("C30", "C01", "C02", "exponential", "exponent"), {}, nominated=False),
+                Form("all", ("C30", "C01", "C02", "exponential", "exponent"), {}, nominated=False, most=steepest),
+                Form(
+                    "stretch power",
+                    ("ogden", "power"),
+                    {"power": (-8.0, 10.0)},
+                    nominated=False,
+                    most={"power": 8 / sizes.strain},
+                    beside=("cubic", "second invariant", "exponential"),
+                ),
             ),
         ),
     }
@@ -286,7 +318,7 @@ def entries(sizes: Sizes) -> list[Entry]:
             out.append(Entry(NonlinearViscosity(), (form,), "viscoelasticity"))
         elif name in special:
             effect, forms = special[name]
-            out.append(Entry(effect, forms, name))
+            out.append(Entry(effect, forms, name, SPARE if effect is ENERGY_FORM else None))
         else:
             effect = kind()
             free = tuple(p.name for p in effect.parameters if not p.frozen)

@@ -24,6 +24,7 @@ GAIN = 8.0
 CLOSE = 6.0
 NEEDED = 0.02
 HELPLESS = 0.2  # share from which an effect may do without helping the held-out recordings
+WORSE = 1.5
 LEFT = 0.15
 LEFT_SEEN = 0.06  # the same where what is left exceeds the noise itself: a quarter of the size
 LEFT_DEAR, CLOSE_DEAR, SEEN_DEAR = 0.08, 0.01, 0.05  # where a prediction is a simulation
@@ -89,13 +90,21 @@ def needed(s: Search, larger: Refit, smaller: Refit) -> bool:
     return outside > 0 or share > HELPLESS or not larger.n_held
 
 
+def worse(s: Search, r: Refit) -> bool:
+    """Whether r predicts the held-out recordings worse than the base model alone: no fix, whatever it fits."""
+    if s.bench.dear or not r.keys or not r.n_held:
+        return False
+    before, after = excess(s, s.empty)[1], excess(s, r)[1]
+    return after > WORSE * before and quality(s, r).z_held > SIGNIFICANT
+
+
 def choose(s: Search) -> Refit:
     """The set of smallest criterion, less every effect that isn't needed."""
-    best = min(s.refits.values(), key=s.criterion)
+    best = min((s.refits[k] for k in best_of_each(s) if not worse(s, s.refits[k])), key=s.criterion)
     while best.keys:
         wanted = [s.names(frozenset(best.keys) - {k}) for k in best.keys]
         smaller = [s.refits[k] for k in best_of_each(s) if s.names(k) in wanted]
-        smaller = [r for r in smaller if not needed(s, best, r)]
+        smaller = [r for r in smaller if not needed(s, best, r) and not worse(s, r)]
         if not smaller:
             break
         best = min(smaller, key=s.criterion)

@@ -10,6 +10,7 @@ import numpy as np
 
 from tissuejax.cache import keep_programs
 from tissuejax.diagnosis.decide import decide
+from tissuejax.diagnosis.kept_refits import KeptRefits
 from tissuejax.diagnosis.material import MaterialBench
 from tissuejax.diagnosis.next_experiment import proposals, settling
 from tissuejax.diagnosis.next_probing import probing_proposals
@@ -51,8 +52,8 @@ def diagnose(
         effects: names of the effects to try; all that can act by default.
         ogden_form: for `ogden-N`.
         budget: how much the search may spend.
-        keep: folder in which a stopped diagnosis of probings finds its finished simulations again (removed at the
-            end); inside `out` by default.
+        keep: folder in which a stopped diagnosis finds again what it had finished (simulations of probings, refits of
+            material tests; removed at the end); inside `out` by default.
 
     Raises:
         InputError: a file that can't be read, an unknown recording or effect, fewer samples than parameters.
@@ -65,8 +66,8 @@ def diagnose(
     fitted, held_out, remarks = split(sample, holdout)
     base = named_energy(energy, ogden_form)
     kind = experiment(sample.recordings[fitted[0]].experiment).kind
+    keep = keep or (None if out is None else Path(out) / "runs")
     if kind == "probing":
-        keep = keep or (None if out is None else Path(out) / "runs")
         bench, budget = ProbingBench.of(sample, base, fitted, held_out, effects, keep), budget or PROBING
     else:
         sigma, more = sigmas(sample, (*fitted, *held_out))
@@ -85,8 +86,14 @@ def diagnose(
             "fit a smaller energy, or record more"
         )
     with (progress or Silent()).stage(f"diagnosing {sample.name}") as stage:
-        look = search_probing if kind == "probing" else search
-        found = look(bench, budget, lambda note: stage.advance(note=note))
+
+        def told(note: str) -> None:
+            stage.advance(note=note)
+
+        if kind == "probing":
+            found = search_probing(bench, budget, told)
+        else:
+            found = search(bench, budget, told, KeptRefits(bench, keep))
     verdict = decide(found)
     if kind == "homogeneous":
         ideas = settling([proposals(sample, base, bench, verdict.chosen, r, None) for r in verdict.rivals[:3]])
@@ -98,6 +105,8 @@ def diagnose(
     diagnosis = Diagnosis(sample.name, energy, found, verdict, time.perf_counter() - begun, ideas, maps)
     if kind == "probing":
         bench.runs.forget()
+    else:
+        found.kept.forget()
     if out is not None:
         write_json(Path(out) / "result.json", diagnosis.as_dict())
         write_json(Path(out) / "remainder.json", diagnosis.remainders())

@@ -22,6 +22,7 @@ from jaxtyping import Array, Float
 from tissuejax.diagnosis.bench import Bench, Candidate, Free, Segment
 from tissuejax.diagnosis.catalogue import Entry, Sizes, entries
 from tissuejax.diagnosis.periodogram import lines
+from tissuejax.diagnosis.plausible import CYCLES
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.energies.energy import Energy
 from tissuejax.experiments.catalogue import experiment
@@ -124,6 +125,16 @@ class MaterialBench(Bench):
         bench._size_up()
         return bench
 
+    def mirrored(self, values: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
+        """Specimens cut along the axes don't say on which side of an axis the fibres lie; see `Bench.mirrored`."""
+        return [{p: (np.pi - values[p]) % np.pi} for p in ("effects.anisotropy.angle",) if p in values]
+
+    def told(self) -> str:
+        """See `Bench.told`."""
+        tests = {n: [np.asarray(getattr(t, f)) for f in t.__dataclass_fields__] for n, t in self._tests.items()}
+        arrays = {n: [a.tobytes() if a.dtype != object else str(a) for a in row] for n, row in tests.items()}
+        return repr((self._energy, [e.effect for e in self._entries], arrays))
+
     def _declare(self, energy: Energy, found: list[Entry]) -> None:
         recordings = (*self.fitted, *self.held_out)
         self._energy, self._entries = energy, found
@@ -132,6 +143,13 @@ class MaterialBench(Bench):
         heavy = self._dear.union(MEMORIES)
         self._heavy = {f"effects.{e.effect.name}.": e.effect.name for e in found if e.effect.name in heavy}
         whole = Model(energy, None, tuple(e.effect for e in found)).across(recordings)
+        self._rich = {
+            f"effects.{e.effect.name}.{p.name}": e.effect.name
+            for e in found
+            if e.spare is not None
+            for p in e.effect.parameters
+            if p.name not in {q.name for q in e.spare.parameters}
+        }
         self._neutral = {p: d.default for p, d in whole.declared.items()}
         for entry in found:
             self._neutral |= {f"effects.{entry.effect.name}.{k}": v for k, v in entry.effect.neutral.items()}
@@ -149,6 +167,12 @@ class MaterialBench(Bench):
             self.free.update(free)
             self.start.update(start)
             self.candidates.update({c.key: c for c in candidates})
+        if (path := "effects.periodic.frequency") in self.free:
+            longest = max(s.time[-1] - s.time[0] for s in self.segments)
+            step = max(float(np.median(np.diff(s.time))) for s in self.segments)
+            lower, upper = CYCLES / longest, max(0.25 / step, 2 * CYCLES / longest)
+            self.free[path] = replace(self.free[path], lower=lower, upper=upper)
+            self.start[path] = 2 * lower
         self._amplitudes = {p for c in self.candidates.values() for p in c.amplitudes}
 
     def _size_up(self) -> None:
@@ -173,10 +197,14 @@ class MaterialBench(Bench):
         parts = {d for p in (*values, *paths) for prefix, d in self._heavy.items() if p.startswith(prefix)}
         if parts.intersection(MEMORIES):  # together: one program fewer to compile
             parts |= {e.effect.name for e in self._entries if e.effect.name in MEMORIES}
-        key = tuple(sorted(parts))
+        rich = {self._rich[p] for p in (*values, *paths) if p in self._rich}
+        key = (*sorted(parts), *sorted(rich))
         if key not in self._built:
-            light = [e.effect for e in self._entries if e.effect.name not in self._heavy.values()]
-            effects = (*light, *(e.effect for e in self._entries if e.effect.name in key))
+            light = [e for e in self._entries if e.effect.name not in self._heavy.values()]
+            effects = (
+                *(e.spare if e.spare is not None and e.effect.name not in rich else e.effect for e in light),
+                *(e.effect for e in self._entries if e.effect.name in parts),
+            )
             model = Model(self._energy, None, effects)
             self._built[key] = (model, {n: self._places(model, n) for n in self._tests})
         return self._built[key]
@@ -247,7 +275,8 @@ class MaterialBench(Bench):
         """See `Bench.burden`: memories run side by side and count once."""
         paths = [p for key in keys for p in self.candidates[key].paths]
         heavy = {d for p in paths for prefix, d in self._heavy.items() if p.startswith(prefix)}
-        return len(heavy.difference(MEMORIES)) + bool(heavy.intersection(MEMORIES))
+        rich = any(p in self._rich for p in paths)
+        return len(heavy.difference(MEMORIES)) + bool(heavy.intersection(MEMORIES)) + rich
 
     def _step(self, path: str, value: float) -> float:
         f = self.free[path]

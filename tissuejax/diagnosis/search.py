@@ -9,15 +9,17 @@ stepping stone.
 
 import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from tissuejax.diagnosis.bench import Bench, Candidate
+from tissuejax.diagnosis.kept_refits import KeptRefits
 from tissuejax.diagnosis.misfit import Misfit, estimated, white
+from tissuejax.diagnosis.plausible import doubts
 from tissuejax.diagnosis.quality import quality
-from tissuejax.diagnosis.refit import Refit, refit
+from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.score import Score, scores
 from tissuejax.errors import NotConverged
 
@@ -34,6 +36,8 @@ class Budget:
         starts: settings of the shapes tried in a refit.
         iterations: of a refit.
         tolerance: of a refit, in units of chi-square.
+        finished: nominees refitted to the end at each size; the rest are dropped after a few steps.
+        promise: share of the excess that the best pair must explain for a third effect to be sought.
         burden: searches and memories nested in a prediction at most (`Bench.burden`): three take a second a prediction.
     """
 
@@ -44,6 +48,8 @@ class Budget:
     starts: int = 2
     iterations: int = 30
     tolerance: float = 0.1
+    finished: tuple[int, ...] = (6, 4, 2)
+    promise: float = 0.6
     burden: int = 2
 
 
@@ -63,6 +69,27 @@ class Search:
     refits: dict[frozenset, Refit] = field(default_factory=dict)
     scored: dict[frozenset, list[Score]] = field(default_factory=dict)
     report: Callable[[str], None] = lambda _: None
+    kept: KeptRefits | None = None
+    _doubts: dict[frozenset, tuple[Refit, tuple[str, ...]]] = field(default_factory=dict)
+
+    def __post_init__(self):
+        self.kept = self.kept or KeptRefits(self.bench)
+
+    def refit(self, keys: Sequence[str], start: Mapping[str, float], **options) -> Refit:
+        """A refit under the present noise (`refit.refit`), found again where a stopped diagnosis left it."""
+        return self.kept.refit(self.misfit, keys, start, **options)
+
+    def doubts(self, keys: frozenset) -> tuple[str, ...]:
+        """What speaks against the names in a set, whatever it explains; see `plausible`."""
+        known = self._doubts.get(keys)
+        if known is None or known[0] is not self.refits[keys]:
+            known = self._doubts[keys] = (self.refits[keys], doubts(self.bench, self.misfit, self.refits[keys]))
+        return known[1]
+
+    @property
+    def best(self) -> Refit:
+        """The fit of smallest criterion among those that have earned their names."""
+        return min((r for k, r in self.refits.items() if not self.doubts(k)), key=self.criterion)
 
     @property
     def empty(self) -> Refit:
@@ -132,19 +159,38 @@ class Search:
                 seen.add(company)
         return out
 
-    def extend(self, keys: frozenset, score: Score) -> frozenset:
-        """Refit of the set with one candidate more, from its most promising settings; remembered."""
-        key = keys | {score.key}
-        if key not in self.refits:
+    def extend(self, extensions: list[tuple[frozenset, Score]], most: int) -> list[frozenset]:
+        """Refits of sets with one candidate more, from its most promising settings; remembered.
+
+        All are given a few steps, and the `most` of smallest criterion in the fitted recordings are finished.
+        """
+        grown, begun = [], {}
+        for keys, score in extensions:
+            key = keys | {score.key}
+            if key in self.refits:
+                grown.append(key)
+                continue
             parent = self.refits[keys]
             candidate = self.bench.candidates[score.key]
             starts = [
                 {**parent.values, **setting, **inside(self.bench, candidate, step, setting, parent.values)}
                 for _, step, setting in distinct(score, self.budget.starts)
             ]
-            self.report(" + ".join([*parent.keys, score.key]))
-            self.refits[key] = self.best((*parent.keys, score.key), starts)
-        return key
+            order = (*parent.keys, score.key)
+            self.report(" + ".join(order))
+            if self.bench.dear:
+                self.refits[key] = self.finished(order, starts)
+                grown.append(key)
+            else:
+                begun.setdefault(key, self.begun(order, starts))
+        for key, r in sorted(begun.items(), key=lambda kr: surprise(kr[1].chi2, kr[1].n) + self.inside(kr[1]))[:most]:
+            self.refits[key] = self.finished(r.keys, [r.values])
+            grown.append(key)
+        return grown
+
+    def begun(self, keys: tuple[str, ...], starts: list[Mapping[str, float]]) -> Refit:
+        """The best of several starts after a few iterations, without errors and held-out recordings."""
+        return min((self.refit(keys, s, iterations=5, final=False) for s in starts), key=lambda t: t.chi2)
 
     def reshape(self, keys: frozenset) -> None:
         """Try every effect of a set in its neighbouring forms, as long as that lowers the criterion."""
@@ -157,11 +203,14 @@ class Search:
                 for new in self.bench.candidates[old].beside:
                     key = at - {old} | {new}
                     if key not in self.refits:
+                        if self.bench.burden(key) > self.budget.burden:
+                            continue
                         self.report(" + ".join([new if k == old else k for k in parent.keys]))
                         starts = [{**parent.values, **setting} for setting in self.bench.candidates[new].grid]
                         order = tuple(new if k == old else k for k in parent.keys)
-                        self.refits[key] = self.best(order, starts[: self.budget.starts])
+                        self.refits[key] = self.finished(order, starts[: self.budget.starts])
                     trials.append(key)
+            trials = [k for k in trials if not self.doubts(k)]
             best = min([at, *trials], key=lambda k: self.criterion(self.refits[k]))
             if best == at:
                 return
@@ -170,28 +219,34 @@ class Search:
     def leave_out(self) -> None:
         """Refit the best set without each of its effects in turn, in all forms; go on from the best of these."""
         at = None
-        while at != (at := frozenset(min(self.refits.values(), key=self.criterion).keys)):
+        while at != (at := frozenset(self.best.keys)):
             parent = self.refits[at]
             for key in parent.keys if len(parent.keys) > 1 else ():
                 smaller = at - {key}
                 if smaller not in self.refits:
                     order = tuple(k for k in parent.keys if k != key)
                     self.report(" + ".join(order))
-                    self.refits[smaller] = self.best(order, [parent.values])
+                    self.refits[smaller] = self.finished(order, [parent.values])
                 self.reshape(smaller)
 
-    def best(self, keys: tuple[str, ...], starts: list[Mapping[str, float]]) -> Refit:
+    def finished(self, keys: tuple[str, ...], starts: list[Mapping[str, float]]) -> Refit:
         """The best of several starts, each given a few iterations before the winner is finished."""
         if len(starts) > 1:
-            tries = [refit(self.bench, self.misfit, keys, s, iterations=5, final=False) for s in starts]
-            starts = [min(tries, key=lambda t: t.chi2).values]
-        budget = self.budget
-        return refit(self.bench, self.misfit, keys, starts[0], iterations=budget.iterations, tolerance=budget.tolerance)
+            starts = [self.begun(keys, starts).values]
+        options = {"iterations": self.budget.iterations, "tolerance": self.budget.tolerance}
+        found = self.refit(keys, starts[0], **options)
+        # Two points that the fitted recordings can't tell apart by symmetry: the held-out ones have a say
+        for other in self.bench.mirrored(found.values):
+            prediction = self.bench.predict({**found.all, **other})
+            seen, unseen = (self.misfit.residual(prediction, n) for n in (self.bench.fitted, self.bench.held_out))
+            if seen @ seen < 2 * found.chi2 and unseen @ unseen < 0.5 * found.held:
+                found = min(found, self.refit(keys, {**found.values, **other}, **options), key=self.criterion)
+        return found
 
     def again(self, keys: frozenset) -> Refit:
         """Refit of a set under the present noise, from where it was."""
         old = self.refits[keys]
-        self.refits[keys] = refit(self.bench, self.misfit, old.keys, old.values, iterations=self.budget.iterations)
+        self.refits[keys] = self.refit(old.keys, old.values, iterations=self.budget.iterations)
         return self.refits[keys]
 
 
@@ -221,14 +276,17 @@ def distinct(score: Score, most: int) -> list[tuple[float, dict, dict]]:
     return kept
 
 
-def search(bench: Bench, budget: Budget | None = None, report: Callable[[str], None] | None = None) -> Search:
+def search(
+    bench: Bench,
+    budget: Budget | None = None,
+    report: Callable[[str], None] | None = None,
+    kept: KeptRefits | None = None,
+) -> Search:
     """Fit the base, then grow sets of candidates as the budget allows; see the module's text."""
     budget = budget or Budget()
-    s = Search(bench, white(bench), budget, report=report or (lambda _: None))
+    s = Search(bench, white(bench), budget, report=report or (lambda _: None), kept=kept)
     s.report("base model")
-    first = refit(
-        bench, s.misfit, (), {}, iterations=2 * budget.iterations, tolerance=budget.tolerance, final=bench.dear
-    )
+    first = s.refit((), {}, iterations=2 * budget.iterations, tolerance=budget.tolerance, final=bench.dear)
     if not math.isfinite(first.chi2):
         raise NotConverged(
             f"the base model can't be fitted to {', '.join(bench.fitted)}: its prediction is not finite there from any "
@@ -236,7 +294,7 @@ def search(bench: Bench, budget: Budget | None = None, report: Callable[[str], N
         )
     if not bench.dear:
         s.misfit = estimated(bench, bench.predict(first.values))
-        first = refit(bench, s.misfit, (), first.values, iterations=2 * budget.iterations)
+        first = s.refit((), first.values, iterations=2 * budget.iterations)
     s.refits[frozenset()] = first
     if bench.dear and quality(s, first).noise:
         s.score(frozenset())
@@ -244,15 +302,19 @@ def search(bench: Bench, budget: Budget | None = None, report: Callable[[str], N
     for size in range(budget.most):
         at = [k for k in best_of_each(s) if len(k) == size][: budget.beam[min(size, len(budget.beam) - 1)]]
         most = budget.nominees[min(size, len(budget.nominees) - 1)]
-        grown = [s.extend(keys, score) for keys, score in s.extensions(at, most)]
-        if not grown:
+        if not s.extend(s.extensions(at, most), budget.finished[min(size, len(budget.finished) - 1)]):
             break
         if size == 0 and not bench.dear:
             renew_noise(s)
         for keys in best_of_each(s)[: 1 if bench.dear else (4, 2, 1)[min(size, 2)]]:
             s.reshape(keys)
-        best = min(s.refits.values(), key=s.criterion)
-        if len(best.keys) <= size or quality(s, best).noise:
+        best = s.best
+        left = (best.chi2 - best.n) / max(s.empty.chi2 - s.empty.n, 1.0)
+        if (
+            len(best.keys) <= size
+            or quality(s, best).noise
+            or (size > 0 and not bench.dear and left > 1 - budget.promise)
+        ):
             break
     if not bench.dear:
         s.leave_out()
@@ -271,17 +333,16 @@ def surprise(chi2: float, n: int) -> float:
 
 
 def best_of_each(s: Search) -> list[frozenset]:
-    """The best form of every set of effects, best first."""
+    """The best form of every set of effects that has earned its names, best first."""
     out: dict[frozenset, frozenset] = {}
-    for keys in sorted(s.refits, key=lambda k: s.criterion(s.refits[k])):
+    for keys in sorted((k for k in s.refits if not s.doubts(k)), key=lambda k: s.criterion(s.refits[k])):
         out.setdefault(s.names(keys), keys)
     return list(out.values())
 
 
 def renew_noise(s: Search) -> None:
     """Estimate the noise again from the best fit so far; if it has changed, refit everything under it."""
-    best = min(s.refits.values(), key=s.criterion)
-    now = estimated(s.bench, best.prediction)
+    now = estimated(s.bench, s.best.prediction)
     changed = any(
         abs(now.noises[c].share - n.share) > 0.1 or abs(now.noises[c].rho - n.rho) > 0.05
         for c, n in s.misfit.noises.items()

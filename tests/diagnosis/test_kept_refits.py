@@ -1,0 +1,71 @@
+"""A diagnosis of material tests that was stopped goes on from the refits that it had finished."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tissuejax.diagnosis import kept_refits
+from tissuejax.diagnosis.diagnose import diagnose
+from tissuejax.diagnosis.search import Budget
+from tissuejax.recordings.recording import Channel, Recording, Sample
+
+QUICK = {"energy": "neo-hookean", "effects": ("drift", "aging"), "budget": Budget(most=2)}
+
+
+def sample(offset: float = 30.0) -> Sample:
+    """Three pulls on a neo-Hookean specimen of 500 Pa that stiffens from one to the next, with a wrong zero."""
+    rng, made, time = np.random.default_rng(3), {}, np.arange(60) * 0.1
+    stretch = 1 + 0.2 * np.sin(np.pi * np.arange(60) / 59)
+    for i, name in enumerate(("r1", "r2", "r3")):
+        y = (1 + 0.1 * i) * 1000 * (stretch - stretch**-2) + offset + 2 * rng.standard_normal(60)
+        channel = Channel(time, y, "Pa", 2.0)
+        made[name] = Recording(
+            name, "uniaxial", {"time": time, "stretch": stretch}, {"nominal_stress": channel}, {"start": 100.0 * i}
+        )
+    return Sample("s", made)
+
+
+@pytest.fixture
+def counted(monkeypatch):
+    """Counts refits; stops at the one whose number is set."""
+    seen = {"run": 0, "stop": -1}
+    whole = kept_refits.refit
+
+    def refit(*args, **options):
+        if seen["run"] == seen["stop"]:
+            raise KeyboardInterrupt
+        seen["run"] += 1
+        return whole(*args, **options)
+
+    monkeypatch.setattr(kept_refits, "refit", refit)
+    return seen
+
+
+def answer(found) -> str:
+    """All that is said, without the time it took."""
+    return json.dumps({k: v for k, v in found.as_dict().items() if k != "seconds"}, default=str)
+
+
+def test_a_stopped_diagnosis_goes_on_and_says_the_same(tmp_path, counted):
+    whole = diagnose(sample(), **QUICK)
+    all_of_them, counted["run"], counted["stop"] = counted["run"], 0, 4
+    with pytest.raises(KeyboardInterrupt):
+        diagnose(sample(), out=tmp_path, **QUICK)
+    with open(tmp_path / "runs" / kept_refits.FILE, "a") as file:
+        file.write('{"mark": "cut o')  # stopped while it was writing
+    counted["run"], counted["stop"] = 0, -1
+    found = diagnose(sample(), out=tmp_path, **QUICK)
+    assert counted["run"] == all_of_them - 4
+    assert answer(found) == answer(whole)
+    assert not (tmp_path / "runs").exists()
+
+
+def test_what_was_kept_of_another_sample_is_not_taken(tmp_path, counted):
+    counted["stop"] = 4
+    with pytest.raises(KeyboardInterrupt):
+        diagnose(sample(), out=tmp_path, **QUICK)
+    counted["run"], counted["stop"] = 0, 1
+    with pytest.raises(KeyboardInterrupt):
+        diagnose(sample(31.0), out=tmp_path, **QUICK)
+    assert counted["run"] == 1

@@ -1,0 +1,87 @@
+"""Finished refits kept on disk, so that a stopped diagnosis of material tests goes on where it was.
+
+A refit is decided by the measurements, the model, the noise and where it starts; their hash is its name. A diagnosis
+that is started again asks for the same refits in the same order and finds them; if a setting or a sample has changed
+it asks for others. A line of JSON each in one file, appended when the refit is finished: numbers come back to the last
+bit, and a line that was cut off when the program was stopped is passed over.
+"""
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from tissuejax.diagnosis.bench import Bench
+from tissuejax.diagnosis.misfit import Misfit
+from tissuejax.diagnosis.refit import Refit, refit
+from tissuejax.errors import InputError
+
+FILE = "refits.jsonl"
+
+
+class KeptRefits:
+    """Refits of one bench, in a folder or (None) not kept at all.
+
+    Attributes:
+        folder: where they are kept.
+        found: how many were not run because they were there.
+    """
+
+    def __init__(self, bench: Bench, folder: Path | None = None):
+        self.folder, self.found = folder, 0
+        self._bench = bench
+        self._known: dict[str, dict] = {}
+        if folder is None:
+            return
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            lines = (folder / FILE).read_text().splitlines() if (folder / FILE).exists() else []
+        except OSError as error:
+            raise InputError(f"{folder}: can't be written ({error.strerror}); name another --out") from error
+        for line in lines:
+            try:
+                one = json.loads(line)
+                self._known[one.pop("mark")] = one
+            except (json.JSONDecodeError, KeyError):
+                continue
+        said = [version(p) for p in ("tissuejax", "jax", "numpy", "scipy")]
+        said += [bench.fitted, bench.held_out, bench.start, bench.free, bench.candidates, bench.told()]
+        said += [(s.recording, s.rows, s.time.tobytes(), s.drive.tobytes()) for s in bench.segments]
+        self._mark = hashlib.sha256(repr(said).encode() + bench.y.tobytes() + bench.sigma.tobytes())
+
+    def refit(self, misfit: Misfit, keys: Sequence[str], start: Mapping[str, float], **options) -> Refit:
+        """`refit.refit`, or what it gave before; `options` are its keywords."""
+        if self.folder is None:
+            return refit(self._bench, misfit, keys, start, **options)
+        noises = {c: (n.share, n.rho) for c, n in misfit.noises.items()}
+        mark = self._mark.copy()
+        mark.update(repr((noises, tuple(keys), sorted(start.items()), sorted(options.items()))).encode())
+        name = mark.hexdigest()[:32]
+        if name in self._known:
+            self.found += 1
+            return self._read(self._known[name], misfit, options.get("final", True))
+        found = refit(self._bench, misfit, keys, start, **options)
+        kept = {k: v for k, v in found.__dict__.items() if k != "prediction"}
+        with open(self.folder / FILE, "a") as file:
+            file.write(json.dumps({"mark": name, **kept}) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+        return found
+
+    def _read(self, kept: dict, misfit: Misfit, final: bool) -> Refit:
+        bench = self._bench
+        tuples = {k: tuple(kept[k]) for k in ("keys", "at_bound")}
+        out = Refit(**{**kept, **tuples}, prediction=np.array([]))
+        recordings = None if final else bench.fitted
+        return replace(out, prediction=bench.predict(out.all if final else out.values, recordings))
+
+    def forget(self) -> None:
+        """Remove what was kept."""
+        if self.folder is not None:
+            shutil.rmtree(self.folder, ignore_errors=True)
