@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tissuejax.diagnosis.quality import SIGNIFICANT, Quality, quality
+from tissuejax.diagnosis.quality import SIGNIFICANT, Quality, quality, veiled
 from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.search import Search, best_of_each
 
@@ -82,7 +82,7 @@ def needed(s: Search, larger: Refit, smaller: Refit) -> bool:
     share = (sum(excess(s, smaller)) - sum(excess(s, larger))) / max(sum(excess(s, s.empty)), 1e-9)
     outside = s.outside(smaller) - s.outside(larger)
     if share < NEEDED:
-        noise = quality(s, larger).noise and not quality(s, smaller).noise
+        noise = quality(s, larger).noise and (not quality(s, smaller).noise or veiled(s, smaller))
         least = 3 * GAIN
         if s.bench.dear:  # laws and meshes differ by as much
             least = max(SEEN_DEAR * (larger.n + larger.n_held), NEEDED / 4 * sum(excess(s, s.empty)))

@@ -12,6 +12,7 @@ no memory.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -97,15 +98,19 @@ class ProbingBench(Bench):
         tests = [setup.test for setup in self.ready.setups.values()]
         session = max(float(t.start) for t in tests) + max(float(np.max(s.time)) for s in self.segments)
         priors = PRIORS | {"aging.rate": AGED / session}
-        found = probing_entries(0.1 * ratio * float(guess))
+        mu, height = ratio * float(guess), float(max(t.height for t in tests))
+        # a base gives way by as much as the tissue over it: no fixed length a pascal is small for soft and stiff alike
+        scales = {"base-slip.compliance": 0.2 * height / mu, "base-slip.fluidity": 0.04 * height / mu}
+        found = probing_entries(0.1 * mu)
         entries = [e for e in found if names is None or e.effect.name in names]
         whole = Model(self.model.energy, None, tuple(e.effect for e in entries)).across(recordings)
         self.entries: dict[str, Entry] = {e.effect.name: e for e in entries}
         for entry in entries:
             free, start, candidates = entry.declare(whole, self.fitted, self.held_out)
             for path, f in free.items():
-                prior = priors.get(".".join(path.split(".")[1:3]))
-                free[path] = f if prior is None else Free(f.lower, f.upper, f.scale, f.unit, f.log, (0.0, prior))
+                generic = ".".join(path.split(".")[1:3])
+                prior = (0.0, priors[generic]) if generic in priors else f.prior
+                free[path] = replace(f, scale=scales.get(generic, f.scale), prior=prior)
             self.free.update(free)
             self.start.update(start)
             self.candidates.update({c.key: c for c in candidates})

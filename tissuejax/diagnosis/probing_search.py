@@ -16,7 +16,7 @@ from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_numerics import numerics
 from tissuejax.diagnosis.probing_runs import COARSE, FINE
-from tissuejax.diagnosis.quality import quality
+from tissuejax.diagnosis.quality import quality, veiled
 from tissuejax.diagnosis.refit import Refit, refit
 from tissuejax.diagnosis.score import Score
 from tissuejax.diagnosis.search import Budget, Search
@@ -54,7 +54,8 @@ def search_probing(bench: ProbingBench, budget: Budget, report: Callable[[str], 
         parent = s.refits[at]
         report(f"scores beside {' + '.join(parent.keys) or 'the base'} (chi-square {parent.chi2 / parent.n:.3g})")
         s.score(at)
-        if quality(s, parent).noise or (not at and bench.numerics.enough(first)):
+        calm = quality(s, parent).noise or (not at and bench.numerics.enough(first))
+        if calm and not veiled(s, parent):
             break
         grown = grow(s, at, budget.nominees[min(size, len(budget.nominees) - 1)])
         if not grown:

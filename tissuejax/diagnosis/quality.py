@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.misfit import Misfit
 from tissuejax.diagnosis.noise import portmanteau
@@ -14,6 +16,8 @@ SIGNIFICANT = 3.5  # standard deviations
 # it says how large a misfit may be and nothing of how it is correlated.
 STATED = 0.5
 TOLERATED = 1.12  # chi-square per sample of a simulation, the numerical error in sigma already
+CHANNEL = 1.3  # the same in one channel alone: many calm markers must not hide a force that is off
+VEILED = 0.04  # chi-square per sample that one linear step may remove before a small misfit counts as something
 
 
 class Judged(Protocol):
@@ -31,6 +35,7 @@ class Quality:
         fitted, held: chi-square per sample.
         z_fitted, z_held: in standard deviations of pure noise.
         z_correlation: of the whitened residuals (Ljung-Box).
+        channel: chi-square per sample of the worst channel, fitted.
     """
 
     fitted: float
@@ -39,12 +44,14 @@ class Quality:
     z_held: float
     z_correlation: float
     dear: bool = False
+    channel: float = 0.0
 
     @property
     def noise(self) -> bool:
         """Whether nothing but noise is left; of simulations, nothing but noise and numerical error."""
         if self.dear:
-            return max(self.fitted, self.held if math.isfinite(self.held) else 0.0) < TOLERATED
+            worst = max(self.fitted, self.held if math.isfinite(self.held) else 0.0)
+            return worst < TOLERATED and self.channel < CHANNEL
         if self.fitted < STATED:
             return max(self.z_fitted, self.z_held) < SIGNIFICANT
         return max(self.z_fitted, self.z_held, self.z_correlation) < SIGNIFICANT
@@ -54,6 +61,10 @@ def quality(s: Judged, r: Refit) -> Quality:
     """Tests of r's residuals."""
     bench, misfit = s.bench, s.misfit
     names = (*bench.fitted, *bench.held_out)
+    channels: dict[str, list[np.ndarray]] = {}
+    for segment in misfit.rows(bench.fitted) if bench.dear else ():
+        z = (bench.y - r.prediction)[segment.rows] / bench.sigma[segment.rows]
+        channels.setdefault(segment.channel, []).append(z)
     series = [misfit.residual(r.prediction, (n,)) for n in names]
     dof = max(r.n - r.k, 1)
     n_held = max(r.n_held - len(r.own), 0)
@@ -67,4 +78,17 @@ def quality(s: Judged, r: Refit) -> Quality:
         z_held,
         portmanteau(series),
         bench.dear,
+        max((float(np.mean(np.concatenate(x) ** 2)) for x in channels.values()), default=0.0),
     )
+
+
+def veiled(s, r: Refit) -> bool:
+    """Whether one linear step of a candidate removes more than noise and numerical error would let it.
+
+    Of simulations: sigma holds the numerical error in full, so a model that lacks little can leave less than one a
+    sample. What a candidate would remove tells the two apart. False before the candidates are scored at r.
+    """
+    scores = s.scored.get(frozenset(r.keys), ())
+    best = max((score.gain for score in scores), default=0.0)
+    numerical = s.bench.numerics.gain if s.bench.numerics is not None else 0.0
+    return s.bench.dear and best > VEILED * r.n and best > 1.5 * numerical
