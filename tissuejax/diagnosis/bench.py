@@ -115,6 +115,7 @@ class Bench(abc.ABC):
         candidates: by key.
         warnings: sentences for the reader.
         dear: True where a prediction is a simulation: noise is taken as recorded, and refits stop early.
+        spent: cost of all predictions so far, in those of the plain base model (see `Budget.spend`).
         numerics: of simulations: what mesh, step and penalty leave open (`probing_numerics.Numerics`), once known.
     """
 
@@ -129,6 +130,7 @@ class Bench(abc.ABC):
     candidates: dict[str, Candidate]
     warnings: list[str] = field(default_factory=list)
     dear: bool = False
+    spent: float = 0.0
     numerics: Any = None
 
     @abc.abstractmethod

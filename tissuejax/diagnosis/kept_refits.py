@@ -65,9 +65,11 @@ class KeptRefits:
         name = mark.hexdigest()[:32]
         if name in self._known:
             self.found += 1
+            self._bench.spent += self._known[name]["spent"]
             return self._read(self._known[name], misfit, options.get("final", True))
+        before = self._bench.spent
         found = refit(self._bench, misfit, keys, start, **options)
-        kept = {k: v for k, v in found.__dict__.items() if k != "prediction"}
+        kept = {"spent": self._bench.spent - before} | {k: v for k, v in found.__dict__.items() if k != "prediction"}
         with open(self.folder / FILE, "a") as file:
             file.write(json.dumps({"mark": name, **kept}) + "\n")
             file.flush()
@@ -77,9 +79,11 @@ class KeptRefits:
     def _read(self, kept: dict, misfit: Misfit, final: bool) -> Refit:
         bench = self._bench
         tuples = {k: tuple(kept[k]) for k in ("keys", "at_bound")}
-        out = Refit(**{**kept, **tuples}, prediction=np.array([]))
-        recordings = None if final else bench.fitted
-        return replace(out, prediction=bench.predict(out.all if final else out.values, recordings))
+        out = Refit(**{k: v for k, v in kept.items() if k != "spent"} | tuples, prediction=np.array([]))
+        recordings, spent = None if final else bench.fitted, bench.spent
+        out = replace(out, prediction=bench.predict(out.all if final else out.values, recordings))
+        bench.spent = spent  # it was counted when the refit was made
+        return out
 
     def forget(self) -> None:
         """Remove what was kept."""

@@ -139,6 +139,8 @@ class MaterialBench(Bench):
         recordings = (*self.fitted, *self.held_out)
         self._energy, self._entries = energy, found
         self._built: dict[tuple[str, ...], tuple[Model, dict]] = {}
+        self._prices: dict[Model, float] = {}
+        self._full = [e.effect for e in found if e.spare is not None]
         self._dear = {e.effect.name for e in found if e.dear}
         heavy = self._dear.union(MEMORIES)
         self._heavy = {f"effects.{e.effect.name}.": e.effect.name for e in found if e.effect.name in heavy}
@@ -235,12 +237,23 @@ class MaterialBench(Bench):
 
     def _run(self, model: Model, theta: Float[np.ndarray, " p"], name: str) -> Float[np.ndarray, "n ..."]:
         """One prediction; NaN where the faces of a specimen could not be found at such parameters."""
+        self.spent += self._price(model)
         try:
             return np.asarray(_predict(model, theta, self._tests[name]))
         except (ValueError, RuntimeError) as error:  # raised inside the compiled program by its linear solver
             if "non-finite" not in str(error):
                 raise
             return np.full_like(self._tests[name].drive, np.nan)
+
+    def _price(self, model: Model) -> float:
+        """What a prediction costs beside that of the base model, from measured times: searches multiply."""
+        if model not in self._prices:
+            names = {e.name for e in model.effects}
+            memory = bool(names.intersection(MEMORIES))
+            inner = 1.0 + memory + 3 * ("anisotropy" in names) + 3 * any(model.effects.count(r) for r in self._full)
+            swelling = (20.0 if memory else 2.5) if "compressibility" in names else 1.0
+            self._prices[model] = inner * swelling * (5.0 if "machine-compliance" in names else 1.0)
+        return self._prices[model]
 
     def _put(self, out: Float[np.ndarray, " N"], name: str, stress: Float[np.ndarray, "n ..."]) -> None:
         for s in self._of[name]:

@@ -38,6 +38,7 @@ class Budget:
         tolerance: of a refit, in units of chi-square.
         finished: nominees refitted to the end at each size; the rest are dropped after a few steps.
         promise: share of the excess that the best pair must explain for a third effect to be sought.
+        spend: cost of predictions, in those of the base model, after which nothing larger is tried (`Bench.spent`).
         burden: searches and memories nested in a prediction at most (`Bench.burden`): three take a second a prediction.
     """
 
@@ -50,6 +51,7 @@ class Budget:
     tolerance: float = 0.1
     finished: tuple[int, ...] = (6, 4, 2)
     promise: float = 0.6
+    spend: float = 4e4
     burden: int = 2
 
 
@@ -87,6 +89,11 @@ class Search:
         return known[1]
 
     @property
+    def exhausted(self) -> bool:
+        """Whether what the search may spend is spent."""
+        return not self.bench.dear and self.bench.spent > self.budget.spend
+
+    @property
     def best(self) -> Refit:
         """The fit of smallest criterion among those that have earned their names."""
         return min((r for k, r in self.refits.items() if not self.doubts(k)), key=self.criterion)
@@ -122,7 +129,11 @@ class Search:
         """Scores of everything that may be added to the set, at its own fit."""
         if keys not in self.scored:
             at, names = self.refits[keys], self.names(keys)
-            left = [c for c in self.bench.candidates.values() if c.name not in names and c.nominated]
+            left = [
+                c
+                for c in self.bench.candidates.values()
+                if c.name not in names and c.nominated and self.bench.burden((*keys, c.key)) <= self.budget.burden
+            ]
             self.scored[keys] = scores(self.bench, self.misfit, at.values, tuple(at.values), left)
         return self.scored[keys]
 
@@ -177,6 +188,8 @@ class Search:
                 for _, step, setting in distinct(score, self.budget.starts)
             ]
             order = (*parent.keys, score.key)
+            if self.exhausted:
+                break
             self.report(" + ".join(order))
             if self.bench.dear:
                 self.refits[key] = self.finished(order, starts)
@@ -203,7 +216,7 @@ class Search:
                 for new in self.bench.candidates[old].beside:
                     key = at - {old} | {new}
                     if key not in self.refits:
-                        if self.bench.burden(key) > self.budget.burden:
+                        if self.bench.burden(key) > self.budget.burden or self.exhausted:
                             continue
                         self.report(" + ".join([new if k == old else k for k in parent.keys]))
                         starts = [{**parent.values, **setting} for setting in self.bench.candidates[new].grid]
@@ -217,16 +230,21 @@ class Search:
             at = best
 
     def leave_out(self) -> None:
-        """Refit the best set without each of its effects in turn, in all forms; go on from the best of these."""
+        """Refit the best set without each of its effects in turn, in all forms; go on from the best of these.
+
+        From where the larger set came to rest, also if that was refitted before: an effect may have been called only
+        because the smaller set's own descent had stopped early.
+        """
         at = None
         while at != (at := frozenset(self.best.keys)):
             parent = self.refits[at]
             for key in parent.keys if len(parent.keys) > 1 else ():
                 smaller = at - {key}
-                if smaller not in self.refits:
-                    order = tuple(k for k in parent.keys if k != key)
-                    self.report(" + ".join(order))
-                    self.refits[smaller] = self.finished(order, [parent.values])
+                order = tuple(k for k in parent.keys if k != key)
+                self.report(" + ".join(order))
+                known, begun = self.refits.get(smaller), self.begun(order, [parent.values])
+                if known is None or begun.chi2 < known.chi2 - 1.0:
+                    self.refits[smaller] = self.finished(order, [begun.values])
                 self.reshape(smaller)
 
     def finished(self, keys: tuple[str, ...], starts: list[Mapping[str, float]]) -> Refit:
@@ -318,6 +336,10 @@ def search(
             break
     if not bench.dear:
         s.leave_out()
+        if s.exhausted:
+            bench.warnings.append(
+                "the search ended when its budget was spent: larger sets of effects were not all tried"
+            )
     return s
 
 
