@@ -43,11 +43,11 @@ def test_forces_are_the_transpose_of_the_gradient_and_hourglass_energy_is_not_ne
     H, P = rng.normal(size=(2, 3, 3, 1))
     v = jnp.einsum("ij,jke->ike", H[..., 0], bent)
     _, memory = element.gradient(reference, jnp.zeros_like(bent))
-    f = element.forces(reference, jnp.broadcast_to(P, (3, 3, 3)), memory, jnp.ones(3))
+    f = jnp.stack(element.forces(reference, jnp.broadcast_to(P, (3, 3, 3)), memory, jnp.ones(3)))
     assert np.allclose(jnp.sum(f * v, (0, 1)), reference.volume * np.sum(P * H), rtol=1e-10)
     w = jnp.asarray(rng.normal(size=bent.shape))
     _, memory = element.gradient(reference, w)
-    f = element.forces(reference, jnp.zeros((3, 3, 3)), memory, jnp.ones(3))
+    f = jnp.stack(element.forces(reference, jnp.zeros((3, 3, 3)), memory, jnp.ones(3)))
     assert (jnp.sum(f * w, (0, 1)) >= -1e-15).all()
 
 
@@ -57,7 +57,7 @@ def test_forces_have_no_resultant_and_no_moment_about_any_point(element, bent, r
     _, memory = element.gradient(reference, 1e-4 * jnp.asarray(rng.normal(size=bent.shape)))
     S = rng.normal(size=(3, 3))
     P = jnp.broadcast_to((S + S.T)[:, :, None], (3, 3, 3))
-    f = element.forces(reference, P, memory, jnp.ones(3))
+    f = jnp.stack(element.forces(reference, P, memory, jnp.ones(3)))
     assert np.allclose(f.sum(1), 0, atol=1e-12)
     moment = np.cross(np.asarray(bent), np.asarray(f), axis=0).sum(1)
     assert np.allclose(moment, 0, atol=1e-12)

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from tissuejax.elements.element import Element, Tensor, barrier, largest_eigenvalue, parts
+from tissuejax.elements.element import Element, Forces, Tensor, barrier, largest_eigenvalue, parts
 
 SIGNS = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], float
@@ -53,15 +53,17 @@ def modes(n: Float[Array, "3 8 E"]) -> Float[Array, "7 3 E"]:
     )  # fmt: skip
 
 
-def nodal(g: list[Float[Array, "3 E"]], h: list[Float[Array, "3 E"]]) -> Float[Array, "3 8 E"]:
-    """Nodal vectors of three gradient and four hourglass modes: the transpose of `modes`."""
-    (x, y, z), (p, q, r, w) = g, h
+def nodal(g: list[Float[Array, "3 E"]], h: list[Float[Array, "3 E"]]) -> tuple[Float[Array, "8 E"], ...]:
+    """Nodal vectors of three gradient and four hourglass modes, one array a component: the transpose of `modes`."""
+    return tuple(_nodal(*(rows[i] for rows in (*g, *h))) for i in range(3))
+
+
+def _nodal(x, y, z, p, q, r, w):
     a, b, c, d = x - q, p - w, x + q, p + w
     odd = (a - b, a + b, c - d, c + d)  # what changes sign along xi, in the order (eta, zeta) = --, +-, -+, ++
     even = (r - y - z, y - r - z, z - y - r, y + r + z)
     pairs = [(e - o, e + o) for e, o in zip(even, odd, strict=True)]
-    turned = (*pairs[0], *pairs[1][::-1], *pairs[2], *pairs[3][::-1])
-    return jnp.stack(turned, 1)
+    return jnp.stack((*pairs[0], *pairs[1][::-1], *pairs[2], *pairs[3][::-1]))
 
 
 def _cross(a: Float[Array, "3 E"], b: Float[Array, "3 E"]) -> Float[Array, "3 E"]:
@@ -128,7 +130,7 @@ class Hex8(Element):
         q = jnp.stack([m[3 + a] - sum(X[a, J] * columns[J] for J in range(3)) for a in range(4)])
         return H + jnp.eye(3, dtype=H.dtype)[:, :, None], q
 
-    def forces(self, reference: Reference, P: Tensor, memory: Any, stiffness: Float[Array, " E"]) -> Array:
+    def forces(self, reference: Reference, P: Tensor, memory: Any, stiffness: Float[Array, " E"]) -> Forces:
         A, W, X, V = reference.gradient, reference.bending, reference.hourglass, reference.volume
         h = parts(barrier(reference.stiffening * stiffness * memory))
         T = parts(barrier(V * P - sum(h[a][:, None] * X[a][None] for a in range(4))), 1)

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from tissuejax.elements.element import Element, Tensor, determinant, inverse, largest_eigenvalue
+from tissuejax.elements.element import Element, Forces, Tensor, determinant, inverse, largest_eigenvalue
 
 
 class Reference(NamedTuple):
@@ -41,10 +41,10 @@ class Tet4(Element):
         H = sum(d[:, a][:, None] * B[a][None] for a in range(3))
         return H + jnp.eye(3, dtype=H.dtype)[:, :, None], ()
 
-    def forces(self, reference: Reference, P: Tensor, memory: Any, stiffness: Float[Array, " E"]) -> Array:
+    def forces(self, reference: Reference, P: Tensor, memory: Any, stiffness: Float[Array, " E"]) -> Forces:
         B = reference.gradient
         f = reference.volume * sum(P[:, J][:, None] * B[:, J][None] for J in range(3))  # (i, node, E)
-        return jnp.concatenate([-jnp.sum(f, 1, keepdims=True), f], 1)
+        return tuple(jnp.concatenate([-jnp.sum(row, 0, keepdims=True), row]) for row in f)
 
     def steepness(self, reference: Reference, hourglass: float) -> Float[Array, " E"]:
         B = jnp.concatenate([-jnp.sum(reference.gradient, 0, keepdims=True), reference.gradient])

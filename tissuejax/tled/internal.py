@@ -67,9 +67,9 @@ def take(u: Float[Array, "... N"], cells: Int[Array, "k E"]) -> Float[Array, "..
     return jnp.stack(barrier(tuple(take(row, cells) for row in parts(u))))
 
 
-def add(f: Float[Array, "... k E"], cells: Int[Array, "k E"], count: int) -> Float[Array, "... N"]:
-    """Element contributions summed at the nodes: the transpose of `take`."""
-    return jnp.zeros((*f.shape[:-2], count), f.dtype).at[..., cells].add(f, mode="promise_in_bounds")
+def add(f: Float[Array, "k E"], cells: Int[Array, "k E"], count: int) -> Float[Array, " N"]:
+    """Element contributions summed at the nodes: the transpose of `take`, one component at a time like it."""
+    return jnp.zeros(count, f.dtype).at[cells].add(f, mode="promise_in_bounds")
 
 
 def rest(scene: Scene, mesh: Mesh) -> History:
@@ -220,8 +220,8 @@ def forces(scene: Scene, mesh: Mesh, u: Float[Array, "3 N"], history: History, s
         p, _ = averaged_pressure(scene, mesh, F)
         P = P + p * cofactor(F)
     P = barrier(P)
-    fe = element.forces(mesh.reference, P, memory, shear * mesh.stiffness)
-    return barrier(add(barrier(fe), mesh.cells, len(mesh.mass))), history
+    fe = barrier(element.forces(mesh.reference, P, memory, shear * mesh.stiffness))
+    return barrier(jnp.stack(barrier(tuple(add(f, mesh.cells, len(mesh.mass)) for f in fe)))), history
 
 
 def internal_energy(scene: Scene, mesh: Mesh, u: Float[Array, "3 N"]):
