@@ -269,6 +269,13 @@ def entries(sizes: Sizes) -> list[Entry]:
                     nominated=False,
                     most={"k2": fibres},
                 ),
+                Form(
+                    "two families",
+                    ("k1", "k2", "angle", "spread"),
+                    {"spread": (0.4,)},
+                    nominated=False,
+                    most={"k2": fibres},
+                ),
             ),
         ),
         "aging": (

@@ -251,7 +251,7 @@ class MaterialBench(Bench):
             names = {e.name for e in model.effects}
             memory = bool(names.intersection(MEMORIES))
             inner = 1.0 + memory + 3 * ("anisotropy" in names) + 3 * any(model.effects.count(r) for r in self._full)
-            swelling = (20.0 if memory else 2.5) if "compressibility" in names else 1.0
+            swelling = (8.0 if memory else 2.5) if "compressibility" in names else 1.0
             self._prices[model] = inner * swelling * (5.0 if "machine-compliance" in names else 1.0)
         return self._prices[model]
 

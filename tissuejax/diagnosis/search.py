@@ -51,7 +51,7 @@ class Budget:
     tolerance: float = 0.1
     finished: tuple[int, ...] = (6, 4, 2)
     promise: float = 0.6
-    spend: float = 4e4
+    spend: float = 2.5e4
     burden: int = 2
 
 

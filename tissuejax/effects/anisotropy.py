@@ -1,4 +1,4 @@
-"""Anisotropy: one family of fibres in a direction that is not known beforehand."""
+"""Anisotropy: one family of fibres, or two alike, in a direction that is not known beforehand."""
 
 from collections.abc import Mapping
 from typing import ClassVar
@@ -18,6 +18,7 @@ class Anisotropy(Effect):
 
     Direction in the sample's frame: `angle` from x towards y, `elevation` from that plane towards z. Shortened fibres
     carry the share `compression` of what they would (0: tension only, the usual assumption; not fitted unless named).
+    With a `spread` half of the fibres lie at angle + spread and half at angle - spread: psi is the mean of the two.
 
     Revealed by different stiffness of specimens cut, or stretched, along different directions. Blind: recordings in one
     direction, or without a `direction`, unless biaxial.
@@ -44,12 +45,18 @@ class Anisotropy(Effect):
             Parameter("k2", "1", 1.0, lower=1e-3, upper=1e3, meaning="stiffening of the fibres"),
             Parameter("angle", "rad", 0.0, lower=-7.0, upper=7.0, scale=0.3, meaning="of the fibres, from x to y"),
             Parameter("elevation", "rad", 0.0, lower=-7.0, upper=7.0, scale=0.3, meaning="of the fibres, towards z"),
+            Parameter("spread", "rad", 0.0, 0.0, np.pi / 2, "half the angle of two families", scale=0.3, frozen=True),
             Parameter("compression", "1", 0.0, lower=0.0, upper=1.0, frozen=True, meaning="share when shortened"),
         )
 
     def energy(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+        spread = p.get("spread", 0.0)
+        return 0.5 * (self._family(p, strain, p["angle"] + spread) + self._family(p, strain, p["angle"] - spread))
+
+    @staticmethod
+    def _family(p: Mapping[str, Array], strain: Strain, angle: Array) -> Float[Array, "..."]:
         C, level = strain.C, jnp.cos(p["elevation"])
-        x, y, z = level * jnp.cos(p["angle"]), level * jnp.sin(p["angle"]), jnp.sin(p["elevation"])
+        x, y, z = level * jnp.cos(angle), level * jnp.sin(angle), jnp.sin(p["elevation"])
         along = x * x * C.xx + y * y * C.yy + z * z * C.zz + 2 * (x * y * C.xy + x * z * C.xz + y * z * C.yz)
         E = strain.J ** (-2 / 3) * along - 1
         squared = jnp.where(E > 0, E * E, p["compression"] * E * E)
