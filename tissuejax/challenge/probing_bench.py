@@ -109,8 +109,6 @@ def record(
     lag = have["clock-lag"].amount if "clock-lag" in have else 0.0
     seen = np.clip(mt - lag, 0, end)
     shown = rest + between(pieces, at, moved, seen) + support(seen)[:, None]
-    if "registration" in have:
-        shown = shown - offset
     felt = sensed(have, path, between(pieces, at, force, ft), ft, clock)
     probe = path.at(time)
     if "machine-compliance" in have:  # the tip went where it went; the actuator had to go further by c F

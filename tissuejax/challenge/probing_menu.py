@@ -84,7 +84,7 @@ CATALOGUED = (
     Course("capsule", lambda r, c: (_log(r, 1, 15) * c * 1e-2, {}), solved=True),
     Course("adhesion", lambda r, c: (_log(r, 300, 3000), {"range": _log(r, 2e-4, 5e-4)}), history=True, solved=True),
     Course("machine-compliance", lambda r, c: (_log(r, 3e-4, 3e-3), {})),
-    Course("base-slip", lambda r, c: (_log(r, 0.03, 1.0) * c / 1e-2, {}), solved=True),
+    Course("base-slip", lambda r, c: (_log(r, 0.15, 3.0) * c / 1e-2, {}), solved=True),
     Course("clock-lag", lambda r, c: (_log(r, 0.04, 0.25) * r.choice([-1.0, 1.0]), {})),
     Course("aging", lambda r, c: (_log(r, 0.03, 0.3) * r.choice([-1.0, 1.0]), {})),
     Course("anisotropy", lambda r, c: (_log(r, 0.5, 6) * c, {"along": [*_turn(r), 0.0]}), solved=True),

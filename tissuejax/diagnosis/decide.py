@@ -37,6 +37,13 @@ SURE = {
     "ambiguous": lambda w, noise, left: w * (0.97 if noise else 0.95 * (1 - left)),
     "unexplained": lambda w, noise, left: min(0.95, 0.6 + 0.5 * left),
 }
+# The same of probings, of which few have been graded: no answer is stated as all but certain.
+SURE_DEAR = {
+    "nothing-missing": lambda noise, left: 0.9,
+    "found": lambda noise, left: 0.95 if noise else 0.85 * (1 - left),
+    "ambiguous": lambda noise, left: 0.95 if noise else 0.85 * (1 - left),
+    "unexplained": lambda noise, left: min(0.8, 0.5 + 0.5 * left),
+}
 FEWER = (1.0, 1.0, 0.97, 0.9)  # the more effects, the more ways to be wrong; a fourth is never tried
 
 
@@ -153,7 +160,7 @@ def decide(s: Search) -> Verdict:
             )
             kind = "ambiguous" if rivals else "found"
     if s.bench.dear:
-        sure = confidence(s, chosen)
+        sure = confidence(s, chosen) * SURE_DEAR[kind](after.noise, amplitude(e0, e1))
     else:
         sure = SURE[kind](weight(s, chosen), after.noise, amplitude(e0, e1))
         sure *= 1.0 if kind == "unexplained" else FEWER[min(len(chosen.keys), 3)]

@@ -85,7 +85,7 @@ def probing_entries(energy: float) -> list[Entry]:
             ),
         ),
         (Friction(), (Form("", ("coefficient",), {}),)),
-        (Adhesion(), (Form("", ("strength", "reach"), {"reach": (2e-4,)}),)),
+        (Adhesion(), (Form("", ("strength", "reach"), {"reach": (1e-4, 3e-4, 8e-4)}),)),
         (Capsule(), (Form("", ("stiffness",), {}),)),
         (BaseSlip(), (Form("", ("compliance", "fluidity"), {}),)),
         (ClockLag(), (Form("", ("lag",), {}),)),

@@ -25,7 +25,7 @@ from tissuejax.errors import NotConverged
 BUDGET = Budget(most=2, beam=(1, 1), nominees=(3, 2), share=0.03, starts=1, iterations=8, tolerance=20.0)
 TRIED = 5  # candidates that take a step
 PROMISING = 0.1  # of the best score: the least for a step
-RIVALS = 0.6  # of the best step's gain: the least for a refit
+RIVALS = 0.3  # of the best step's gain: the least for a refit; a step from far off tells little
 CLOSE = 0.85  # the same, once one refit leaves nothing but noise
 
 
@@ -84,7 +84,11 @@ def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
     before = s.misfit.residual(s.bench.runs.many([(parent.values, s.bench.fitted, COARSE)])[0], s.bench.fitted)
     whole = float(before @ before)
     grown: list[frozenset] = []
-    for chi2, key, trial in trials[:most]:
+    for chi2, key, trial in trials:
+        if len(grown) == most:
+            break
+        if s.names(at | {key}) in [s.names(k) for k in grown]:
+            continue  # forms of one effect are compared in `richer`
         enough = any(quality(s, s.refits[k]).noise for k in grown)
         if whole - chi2 < (CLOSE if enough else RIVALS) * (whole - trials[0][0]):
             break

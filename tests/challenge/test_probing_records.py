@@ -1,0 +1,56 @@
+"""Records of probing cases: what only sensors feel is not solved for again."""
+
+import numpy as np
+import pytest
+
+from tissuejax.challenge.lobe import Lobe
+from tissuejax.challenge.material import Ingredient
+from tissuejax.challenge.probe_paths import Path, over
+from tissuejax.challenge.probing_bench import record
+from tissuejax.challenge.solid import Tissue
+
+LOBE = Lobe(0.03, 0.027, 0.09, 0.02, 0.5, 0.9, (0.0, 0.0))
+RADIUS = 0.0095
+
+
+@pytest.fixture(scope="module")
+def told():
+    """Function from effects to the record of one short press, and what has been solved so far."""
+    top = over(LOBE, (0.0, 0.0), RADIUS)
+    heights = np.array([top + 5e-4, top + 5e-4, top - 1.5e-3, top - 1.5e-3, top + 5e-4, top + 5e-4])
+    path = Path(np.array([0.0, 0.4, 1.4, 2.4, 3.4, 3.8]), np.stack([0 * heights, 0 * heights, heights], 1))
+    solved: dict = {}
+
+    def of(*effects: Ingredient):
+        places = [(0.3, 0.2), (-0.2, 0.4)]
+        site = (0.0, 0.0)
+        body = LOBE, Tissue(600.0, 300.0, 2e4), list(effects), path, site, [site], RADIUS, places
+        return record(*body, 0, (100.0, 400.0), 0.0, (5, 5, 3), solved)
+
+    return of, solved
+
+
+def test_sensors_and_rig_share_one_solution(told):
+    of, solved = told
+    plain = of()
+    assert np.abs(plain.force[:, 2]).max() > 0.02
+    assert len(solved) == 1
+    drifting = of(Ingredient("drift", "", 0.01, {"mix": [1.0, 0.5]}))
+    time = plain.force_time
+    expected = 0.01 * (1 + 0.05 * time)[:, None] * [0.2, -0.1, 1.0]
+    np.testing.assert_allclose(drifting.force - plain.force, expected, atol=1e-12)
+    aged = of(Ingredient("aging", "", -0.2, {}))
+    np.testing.assert_allclose(aged.force, plain.force * np.exp(-0.2 * (100 + time) / 400)[:, None], atol=1e-12)
+    soft = of(Ingredient("machine-compliance", "", 2e-3, {}))
+    deepest = np.argmin(plain.probe[:, 2])
+    felt = np.interp(plain.time[deepest], time, plain.force[:, 2])
+    assert plain.probe[deepest, 2] - soft.probe[deepest, 2] == pytest.approx(2e-3 * felt, rel=0.02)
+    assert len(solved) == 1
+
+
+def test_the_body_is_solved_for_again_where_it_feels_the_effect(told):
+    of, solved = told
+    plain, lower = of(), of(Ingredient("contact-offset", "", 3e-4, {"signs": [-1.0]}))
+    assert len(solved) == 2
+    assert lower.force[:, 2].max() > 1.1 * plain.force[:, 2].max()
+    np.testing.assert_array_equal(lower.probe, plain.probe)

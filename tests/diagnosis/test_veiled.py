@@ -1,0 +1,36 @@
+"""A weak effect of a probing that leaves less than one a sample: calm markers and a cautious sigma must not hide it."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+from tissuejax.diagnosis.decide import SURE_DEAR
+from tissuejax.diagnosis.quality import CHANNEL, TOLERATED, VEILED, Quality, veiled
+
+
+def searched(gain: float, numerical: float | None = None, dear: bool = True, keys: tuple[str, ...] = ()):
+    numerics = None if numerical is None else SimpleNamespace(gain=numerical)
+    scores = [SimpleNamespace(gain=gain), SimpleNamespace(gain=0.0)]
+    return SimpleNamespace(bench=SimpleNamespace(dear=dear, numerics=numerics), scored={frozenset(keys): scores})
+
+
+def test_a_force_that_is_off_is_not_averaged_away_by_many_markers():
+    calm = Quality(fitted=1.05, held=1.0, z_fitted=3.0, z_held=0.0, z_correlation=9.0, dear=True, channel=1.05)
+    assert calm.noise
+    assert not replace(calm, channel=CHANNEL + 0.1).noise
+    assert not replace(calm, held=TOLERATED + 0.1).noise
+
+
+def test_what_a_candidate_would_remove_tells_a_weak_effect_from_none():
+    fit = SimpleNamespace(keys=(), n=10_000)
+    assert veiled(searched(2 * VEILED * fit.n), fit)
+    assert not veiled(searched(0.5 * VEILED * fit.n), fit)
+    assert not veiled(searched(2 * VEILED * fit.n, numerical=1.5 * VEILED * fit.n), fit), "mesh and step would as well"
+    assert not veiled(searched(2 * VEILED * fit.n, dear=False), fit), "material tests have no numerical error"
+    assert not veiled(searched(2 * VEILED * fit.n, keys=("friction",)), fit), "not scored there yet"
+
+
+def test_no_answer_about_a_probing_is_stated_as_certain():
+    assert all(
+        sure(noise, left) <= 0.95 for sure in SURE_DEAR.values() for noise in (True, False) for left in (0.0, 1.0)
+    )
+    assert SURE_DEAR["found"](False, 0.3) < SURE_DEAR["found"](False, 0.1) < SURE_DEAR["found"](True, 0.1)
