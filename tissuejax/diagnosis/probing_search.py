@@ -26,6 +26,7 @@ BUDGET = Budget(most=2, beam=(1, 1), nominees=(3, 2), share=0.03, starts=1, iter
 TRIED = 5  # candidates that take a step
 PROMISING = 0.1  # of the best score: the least for a step
 RIVALS = 0.3  # of the best step's gain: the least for a refit; a step from far off tells little
+SETTLED, NEARLY = 0.03, 1.3  # share of the base's excess, and chi-square per sample, that a found effect may leave
 CLOSE = 0.85  # the same, once one refit leaves nothing but noise
 
 
@@ -67,9 +68,18 @@ def search_probing(bench: ProbingBench, budget: Budget, report: Callable[[str], 
         if len(best) > 1:
             leave_out(s, best)
         at = best
-        if quality(s, s.refits[best]).noise:
+        if quality(s, s.refits[best]).noise or settled(s, s.refits[best]):
             break
     return s
+
+
+def settled(s: Search, r: Refit) -> bool:
+    """Whether what is left is as small as the numerical error of what was found: a further effect would take that up.
+
+    The scores beside an effect cost as much as all before them, and no set is believed for so small a share.
+    """
+    left, whole = r.chi2 - (r.n - r.k), s.empty.chi2 - (s.empty.n - s.empty.k)
+    return left < SETTLED * whole and r.chi2 / r.n < NEARLY
 
 
 def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
@@ -89,7 +99,7 @@ def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
             break
         if s.names(at | {key}) in [s.names(k) for k in grown]:
             continue  # forms of one effect are compared in `richer`
-        enough = any(quality(s, s.refits[k]).noise for k in grown)
+        enough = any(quality(s, s.refits[k]).noise or settled(s, s.refits[k]) for k in grown)
         if whole - chi2 < (CLOSE if enough else RIVALS) * (whole - trials[0][0]):
             break
         s.report(" + ".join(trial.keys))
