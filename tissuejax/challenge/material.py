@@ -12,7 +12,9 @@ from jaxtyping import Float
 from tissuejax.challenge import memory_laws, rig_laws, stray_laws
 from tissuejax.challenge.specimen import Tensors, Trial, axes, gradient, kirchhoff, nominal, settle
 from tissuejax.challenge.strain_laws import Body
+from tissuejax.errors import NotConverged
 
+DRAINING = 100  # rounds of pressure and volume at most
 History = Float[np.ndarray, "n ..."]
 
 
@@ -101,10 +103,15 @@ def specimen_stress(specimen: Specimen, trial: Trial, drive: History) -> History
     ln_J, skew = settle(trial, seen, stress, body.bulk, body.fibrous, mu)
     F = gradient(trial.kind, seen, ln_J, skew)
     if (leak := specimen.get("compressibility")) and leak.law == "drained":
-        for _ in range(4):
+        for _ in range(DRAINING):
             push = kirchhoff(F, stress(F))[:, 2, 2]
-            ln_J = memory_laws.drained(trial.time, push, mu / leak.amount, **leak.shape)
+            before, ln_J = ln_J, memory_laws.drained(trial.time, push, mu / leak.amount, **leak.shape)
+            ln_J = before + 0.6 * (ln_J - before)  # without it a soft specimen overshoots, from loss to gain and back
             F = gradient(trial.kind, seen, ln_J, skew)
+            if np.max(np.abs(ln_J - before)) < 1e-9:
+                break
+        else:
+            raise NotConverged(f"{trial.name}: volume and pressure of a draining specimen don't meet")
     W, S = law(np.swapaxes(F, 1, 2) @ F)
     size = strain if strain.ndim == 1 else np.max(np.abs(strain), -1)
     if damage := specimen.get("softening"):
