@@ -44,7 +44,7 @@ SURE_DEAR = {
     "ambiguous": lambda noise, left: 0.95 if noise else 0.85 * (1 - left),
     "unexplained": lambda noise, left: min(0.8, 0.5 + 0.5 * left),
 }
-FEWER = (1.0, 1.0, 0.97, 0.9)  # the more effects, the more ways to be wrong; a fourth is never tried
+FEWER = (1.0, 1.0, 0.93, 0.88)  # the more effects, the more ways to be wrong; a fourth is never tried
 
 
 @dataclass(frozen=True)
