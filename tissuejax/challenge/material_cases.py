@@ -15,6 +15,7 @@ from tissuejax.errors import NotConverged
 
 CATEGORIES = ("none", "one", "two", "three", "unknown")
 SHARES = (0.20, 0.45, 0.14, 0.06, 0.15)
+NOTHING = 1e-3  # size over noise: the told energy has that very term
 NOMINAL = next(c for c in CATALOGUED if c.name == "viscoelasticity" and c.law == "nominal")
 ALIKE = ({"slack", "machine-compliance"}, {"anisotropy", "aging"}, {"compressibility", "platen-friction"})
 
@@ -134,6 +135,8 @@ def _draw(name: str, rng: np.random.Generator, kind: str, turn: int) -> Case:
         amount, sizes[made.name] = reach(
             lambda a, alone=alone, made=made, sign=sign: size(alone.scaled(made.name, sign * a)), target, least, most
         )
+        if sizes[made.name] < NOTHING:
+            raise NotConverged(f"{made.name}/{made.law} is a part of {energy}: there would be nothing to find")
         added.append(replace(made, amount=sign * amount))
     tolerated = []
     if kind in ("one", "two") and rng.random() < 0.15 and all(c.name != "energy-form" for c in picked):
