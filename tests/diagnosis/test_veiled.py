@@ -4,7 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from tissuejax.diagnosis.decide import SURE_DEAR
-from tissuejax.diagnosis.quality import CHANNEL, TOLERATED, VEILED, Quality, veiled
+from tissuejax.diagnosis.quality import CHANNEL, TOLERATED_HELD, VEILED, Quality, veiled
 
 
 def searched(gain: float, numerical: float | None = None, dear: bool = True, keys: tuple[str, ...] = ()):
@@ -17,7 +17,7 @@ def test_a_force_that_is_off_is_not_averaged_away_by_many_markers():
     calm = Quality(fitted=1.05, held=1.0, z_fitted=3.0, z_held=0.0, z_correlation=9.0, dear=True, channel=1.05)
     assert calm.noise
     assert not replace(calm, channel=CHANNEL + 0.1).noise
-    assert not replace(calm, held=TOLERATED + 0.1).noise
+    assert not replace(calm, held=TOLERATED_HELD + 0.1).noise
 
 
 def test_what_a_candidate_would_remove_tells_a_weak_effect_from_none():

@@ -13,7 +13,7 @@ from tissuejax.challenge.quasistatic import Bed, Bench
 from tissuejax.challenge.solid import Solid, Tissue
 from tissuejax.challenge.touch import Membrane, Sphere
 
-MESH = (14, 14, 6)
+MESH = (16, 16, 6)
 STRIDE = 5e-4
 SENSED = {
     "drift",

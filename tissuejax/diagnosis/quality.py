@@ -16,6 +16,7 @@ SIGNIFICANT = 3.5  # standard deviations
 # it says how large a misfit may be and nothing of how it is correlated.
 STATED = 0.5
 TOLERATED = 1.12  # chi-square per sample of a simulation, the numerical error in sigma already
+TOLERATED_HELD = 1.2  # where nothing was fitted, the numerical error is met in full
 CHANNEL = 1.3  # the same in one channel alone: many calm markers must not hide a force that is off
 VEILED = 0.04  # chi-square per sample that one linear step may remove before a small misfit counts as something
 
@@ -50,8 +51,8 @@ class Quality:
     def noise(self) -> bool:
         """Whether nothing but noise is left; of simulations, nothing but noise and numerical error."""
         if self.dear:
-            worst = max(self.fitted, self.held if math.isfinite(self.held) else 0.0)
-            return worst < TOLERATED and self.channel < CHANNEL
+            held = self.held if math.isfinite(self.held) else 0.0
+            return self.fitted < TOLERATED and held < TOLERATED_HELD and self.channel < CHANNEL
         if self.fitted < STATED:
             return max(self.z_fitted, self.z_held) < SIGNIFICANT
         return max(self.z_fitted, self.z_held, self.z_correlation) < SIGNIFICANT
