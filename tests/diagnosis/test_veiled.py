@@ -3,7 +3,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-from tissuejax.diagnosis.decide import SURE_DEAR
+from tissuejax.diagnosis.decide import SEEN_DEAR, SURE_DEAR, needed
 from tissuejax.diagnosis.quality import CHANNEL, TOLERATED_HELD, VEILED, Quality, veiled
 
 
@@ -34,3 +34,22 @@ def test_no_answer_about_a_probing_is_stated_as_certain():
         sure(noise, left) <= 0.95 for sure in SURE_DEAR.values() for noise in (True, False) for left in (0.0, 1.0)
     )
     assert SURE_DEAR["found"](False, 0.3) < SURE_DEAR["found"](False, 0.1) < SURE_DEAR["found"](True, 0.1)
+
+
+def fits_of(gained: float, n: int = 10_000):
+    """A search whose larger fit lowers the criterion by `gained`, half of it held out; what was missing is small."""
+
+    def fit(keys, chi2):
+        return SimpleNamespace(keys=keys, chi2=chi2, held=chi2, n=n, n_held=n, k=3, own={})
+
+    small, large = fit((), 1.04 * n), fit(("softening",), 1.04 * n - gained / 2)
+    bench = SimpleNamespace(dear=True, numerics=None)
+    search = SimpleNamespace(
+        bench=bench, empty=small, scored={}, criterion=lambda r: 2 * r.chi2, outside=lambda r: r.chi2
+    )
+    return search, large, small
+
+
+def test_an_effect_that_gains_less_than_laws_and_meshes_differ_by_is_not_needed():
+    assert not needed(*fits_of(0.5 * SEEN_DEAR * 20_000))
+    assert needed(*fits_of(1.5 * SEEN_DEAR * 20_000))

@@ -84,15 +84,14 @@ def needed(s: Search, larger: Refit, smaller: Refit) -> bool:
     fitted: so an effect of small share has to help with the held-out recordings as well.
     """
     gained = s.criterion(smaller) - s.criterion(larger)
-    if gained < GAIN:
+    seen = SEEN_DEAR * (larger.n + larger.n_held) if s.bench.dear else 0.0  # laws and meshes differ by as much
+    if gained < max(GAIN, seen):
         return False
     share = (sum(excess(s, smaller)) - sum(excess(s, larger))) / max(sum(excess(s, s.empty)), 1e-9)
     outside = s.outside(smaller) - s.outside(larger)
     if share < NEEDED:
         noise = quality(s, larger).noise and (not quality(s, smaller).noise or veiled(s, smaller))
-        least = 3 * GAIN
-        if s.bench.dear:  # laws and meshes differ by as much
-            least = max(SEEN_DEAR * (larger.n + larger.n_held), NEEDED / 4 * sum(excess(s, s.empty)))
+        least = max(seen, NEEDED / 4 * sum(excess(s, s.empty))) if s.bench.dear else 3 * GAIN
         return noise and gained > least and (outside > GAIN / 2 or not larger.n_held)
     return outside > 0 or share > HELPLESS or not larger.n_held
 
