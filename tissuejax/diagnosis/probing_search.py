@@ -99,7 +99,9 @@ def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
             break
         if s.names(at | {key}) in [s.names(k) for k in grown]:
             continue  # forms of one effect are compared in `richer`
-        enough = any(quality(s, s.refits[k]).noise or settled(s, s.refits[k]) for k in grown)
+        calm = [k for k in grown if quality(s, s.refits[k]).noise or settled(s, s.refits[k])]
+        # values of its own in every recording mimic much that is common to all: those rivals have to be heard
+        enough = any(not s.bench.candidates[c].held for k in calm for c in k - at)
         if whole - chi2 < (CLOSE if enough else RIVALS) * (whole - trials[0][0]):
             break
         s.report(" + ".join(trial.keys))
