@@ -15,7 +15,7 @@ import equinox as eqx
 import numpy as np
 
 from tissuejax.diagnosis.probing_runs import COARSE
-from tissuejax.diagnosis.probing_series import CHANNELS, picked, put
+from tissuejax.diagnosis.probing_series import CHANNELS, filled, picked, put
 from tissuejax.effects.effect import Effect
 from tissuejax.experiments.probing_sensors import smooth_path
 from tissuejax.recordings.recording import Channel
@@ -168,7 +168,7 @@ def _told(bench: "ProbingBench", effect: Effect, values: Mapping[str, float], na
     measured, channels = bench.ready.sample.recordings[name].channels, {}
     for channel in CHANNELS:
         if channel in measured:
-            full = np.nan_to_num(np.asarray(measured[channel].values, float))
+            full = filled(np.asarray(measured[channel].values, float))
             for s in bench.segments:
                 if s.recording == name and s.channel == channel:
                     put(full, s, bench.finite, origin)

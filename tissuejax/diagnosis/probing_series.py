@@ -76,6 +76,20 @@ def put(full: np.ndarray, s: Segment, finite: Mapping, vector: np.ndarray) -> No
     full.reshape(len(full), -1)[finite[s.rows.start], column(s)] = vector[s.rows]
 
 
+def filled(values: np.ndarray) -> np.ndarray:
+    """Lost samples (NaN) read off the line between their neighbours in time; 0 where a column has none at all.
+
+    A lost marker must not stand at the origin: its neighbours in time are read next to it once a clock is shifted.
+    """
+    out = np.array(values, float)
+    flat = out.reshape(len(out), -1)
+    index = np.arange(len(out))
+    for j in range(flat.shape[1]):
+        good = np.isfinite(flat[:, j])
+        flat[~good, j] = np.interp(index[~good], index[good], flat[good, j]) if good.any() else 0.0
+    return out
+
+
 def column(s: Segment) -> int:
     """Column of a segment in its channel's array, all trailing axes flat."""
     axis = "xyz".index(s.component[-1])

@@ -37,6 +37,7 @@ DENSITY = 1060.0  # kg/m^3, soft tissue: inertia is nothing in a probing, so a g
 # What differs between recordings is padded to multiples of these, so that they share one compiled program
 FRAMES, SAMPLES, PATCH = 512, 2048, 64
 FORCES, SHOWN, MARKERS = 1024, 256, 12
+LATE = 0.5  # s simulated beyond the last sample: a clock that is off reads there, and later frames are zero
 
 
 class Setup(eqx.Module):
@@ -238,7 +239,7 @@ def _clock(recording, probe_time, settings) -> tuple[Clock, np.ndarray, np.ndarr
     interval = spacing if even else settings.interval
     begin = t[0] - 0.5 * interval
     last = max(t[-1], probe_time[-1] if "markers" in recording.channels else t[-1])
-    needed = int(np.ceil((last - begin) / interval)) + 1
+    needed = int(np.ceil((last + LATE - begin) / interval)) + 1
     frames = needed + -needed % FRAMES
     steps = settings.changed(interval=interval).steps
     speed = np.asarray(settings.compression)
