@@ -69,3 +69,10 @@ def test_what_was_kept_of_another_sample_is_not_taken(tmp_path, counted):
     with pytest.raises(KeyboardInterrupt):
         diagnose(sample(31.0), out=tmp_path, **QUICK)
     assert counted["run"] == 1
+
+
+def test_a_search_ends_when_its_budget_is_spent_and_says_so():
+    found = diagnose(sample(), energy="neo-hookean", effects=("drift", "aging"), budget=Budget(most=2, spend=1.0))
+    assert any("budget was spent" in w for w in found.as_dict()["warnings"])
+    assert [k for k in found.search.refits if k] == []
+    assert found.verdict.kind == "unexplained"

@@ -153,8 +153,8 @@ class Bench(abc.ABC):
         """Shapes at which to score a candidate; a bench may read some from the residual (a period, a place)."""
         return candidate.grid
 
-    def mirrored(self, values: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
-        """Changes of `values` that many sets of recordings don't see (a direction turned into its mirror image)."""
+    def elsewhere(self, values: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
+        """Other values to start from that recordings may allow as well as `values` (another direction)."""
         return ()
 
     def told(self) -> str:

@@ -33,7 +33,11 @@ from tissuejax.parameters import Parameter
 
 MOST = 24  # settings of one candidate's shapes at most
 ENERGY_FORM = EnergyForm(terms=("C30", "C01", "C02", "exponential", "ogden"))
-SPARE = EnergyForm(terms=("C30", "C01", "C02", "exponential"))  # principal stretches cost as much as all the rest
+FIBRES = Anisotropy(families=2)
+SPARE = {  # principal stretches cost as much as all the rest, a second family half as much again
+    "energy-form": EnergyForm(terms=("C30", "C01", "C02", "exponential")),
+    "anisotropy": Anisotropy(),
+}
 DEAR = ("machine-compliance", "nonlinear-viscosity", "compressibility")  # a search inside every prediction
 
 
@@ -254,7 +258,7 @@ def entries(sizes: Sizes) -> list[Entry]:
             ),
         ),
         "anisotropy": (  # along an axis of the test an angle has no slope to leave it by
-            Anisotropy(),
+            FIBRES,
             (
                 Form(
                     "in the xy plane",
@@ -325,7 +329,7 @@ def entries(sizes: Sizes) -> list[Entry]:
             out.append(Entry(NonlinearViscosity(), (form,), "viscoelasticity"))
         elif name in special:
             effect, forms = special[name]
-            out.append(Entry(effect, forms, name, SPARE if effect is ENERGY_FORM else None))
+            out.append(Entry(effect, forms, name, SPARE.get(name)))
         else:
             effect = kind()
             free = tuple(p.name for p in effect.parameters if not p.frozen)

@@ -125,9 +125,16 @@ class MaterialBench(Bench):
         bench._size_up()
         return bench
 
-    def mirrored(self, values: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
-        """Specimens cut along the axes don't say on which side of an axis the fibres lie; see `Bench.mirrored`."""
-        return [{p: (np.pi - values[p]) % np.pi} for p in ("effects.anisotropy.angle",) if p in values]
+    def elsewhere(self, values: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
+        """Specimens cut along two axes allow several directions of the fibres; see `Bench.elsewhere`."""
+        paths = [p for p in values if p in ("effects.anisotropy.angle", "effects.anisotropy.spread")]
+        if not paths:
+            return ()
+        fresh = {
+            "effects.anisotropy.k2": self.candidates["anisotropy/in the xy plane"].grid[0]["effects.anisotropy.k2"]
+        }
+        angles = [(2 * k + 1) * np.pi / 8 for k in range(4)]
+        return [fresh | {p: a if p.endswith("angle") else 0.4 for p in paths} for a in angles]
 
     def told(self) -> str:
         """See `Bench.told`."""
@@ -203,10 +210,8 @@ class MaterialBench(Bench):
         key = (*sorted(parts), *sorted(rich))
         if key not in self._built:
             light = [e for e in self._entries if e.effect.name not in self._heavy.values()]
-            effects = (
-                *(e.spare if e.spare is not None and e.effect.name not in rich else e.effect for e in light),
-                *(e.effect for e in self._entries if e.effect.name in parts),
-            )
+            taking = [*light, *(e for e in self._entries if e.effect.name in parts)]
+            effects = tuple(e.spare if e.spare is not None and e.effect.name not in rich else e.effect for e in taking)
             model = Model(self._energy, None, effects)
             self._built[key] = (model, {n: self._places(model, n) for n in self._tests})
         return self._built[key]
@@ -249,10 +254,12 @@ class MaterialBench(Bench):
         """What a prediction costs beside that of the base model, from measured times: searches multiply."""
         if model not in self._prices:
             names = {e.name for e in model.effects}
-            memory = bool(names.intersection(MEMORIES))
-            inner = 1.0 + memory + 3 * ("anisotropy" in names) + 3 * any(model.effects.count(r) for r in self._full)
-            swelling = (8.0 if memory else 2.5) if "compressibility" in names else 1.0
-            self._prices[model] = inner * swelling * (5.0 if "machine-compliance" in names else 1.0)
+            memory, fibres = bool(names.intersection(MEMORIES)), "anisotropy" in names
+            full = any(e in self._full for e in model.effects)
+            inner = 1.0 + 1.5 * memory + 4 * fibres + 3 * full
+            swelling = (8.0 if memory else 3.0) if "compressibility" in names else 1.0
+            rig = (8.0 if fibres else 5.0) if "machine-compliance" in names else 1.0
+            self._prices[model] = inner * swelling * rig
         return self._prices[model]
 
     def _put(self, out: Float[np.ndarray, " N"], name: str, stress: Float[np.ndarray, "n ..."]) -> None:
@@ -288,7 +295,7 @@ class MaterialBench(Bench):
         """See `Bench.burden`: memories run side by side and count once."""
         paths = [p for key in keys for p in self.candidates[key].paths]
         heavy = {d for p in paths for prefix, d in self._heavy.items() if p.startswith(prefix)}
-        rich = any(p in self._rich for p in paths)
+        rich = any(self._rich.get(p, "anisotropy") != "anisotropy" for p in paths)
         return len(heavy.difference(MEMORIES)) + bool(heavy.intersection(MEMORIES)) + rich
 
     def _step(self, path: str, value: float) -> float:

@@ -23,6 +23,8 @@ from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.score import Score, scores
 from tissuejax.errors import NotConverged
 
+ALLOWED = 1.5  # chi-square per sample up to which a fit explains its recordings
+
 
 @dataclass(frozen=True)
 class Budget:
@@ -51,7 +53,7 @@ class Budget:
     tolerance: float = 0.1
     finished: tuple[int, ...] = (6, 4, 2)
     promise: float = 0.6
-    spend: float = 2.5e4
+    spend: float = 3e4
     burden: int = 2
 
 
@@ -253,12 +255,16 @@ class Search:
             starts = [self.begun(keys, starts).values]
         options = {"iterations": self.budget.iterations, "tolerance": self.budget.tolerance}
         found = self.refit(keys, starts[0], **options)
-        # Two points that the fitted recordings can't tell apart by symmetry: the held-out ones have a say
-        for other in self.bench.mirrored(found.values):
-            prediction = self.bench.predict({**found.all, **other})
-            seen, unseen = (self.misfit.residual(prediction, n) for n in (self.bench.fitted, self.bench.held_out))
-            if seen @ seen < 2 * found.chi2 and unseen @ unseen < 0.5 * found.held:
-                found = min(found, self.refit(keys, {**found.values, **other}, **options), key=self.criterion)
+        # the fitted recordings explained and the held-out ones not: the former may allow other values as well
+        if self.bench.dear or found.chi2 > ALLOWED * found.n or found.held <= ALLOWED * found.n_held:
+            return found
+        for other in self.bench.elsewhere(found.values):
+            if self.exhausted:
+                break
+            again = self.refit(keys, {**found.values, **other}, **options)
+            found = min(found, again, key=self.criterion)
+            if found.held <= ALLOWED * found.n_held:
+                break
         return found
 
     def again(self, keys: frozenset) -> Refit:

@@ -18,7 +18,7 @@ class Anisotropy(Effect):
 
     Direction in the sample's frame: `angle` from x towards y, `elevation` from that plane towards z. Shortened fibres
     carry the share `compression` of what they would (0: tension only, the usual assumption; not fitted unless named).
-    With a `spread` half of the fibres lie at angle + spread and half at angle - spread: psi is the mean of the two.
+    With two `families` half of them lie at angle + `spread`, half at angle - `spread`: psi is the mean of the two.
 
     Revealed by different stiffness of specimens cut, or stretched, along different directions. Blind: recordings in one
     direction, or without a `direction`, unless biaxial.
@@ -38,19 +38,26 @@ class Anisotropy(Effect):
         "elevation": (0.0, np.pi / 4, np.pi / 2),
     }
 
+    families: int = 1
+
     @property
     def parameters(self) -> tuple[Parameter, ...]:
+        spread = Parameter(
+            "spread", "rad", 0.0, 0.0, np.pi / 2, "half the angle of two families", scale=0.3, frozen=True
+        )
         return (
             Parameter("k1", "Pa", 0.0, lower=0.0, scale=100.0, meaning="stiffness of the fibres"),
             Parameter("k2", "1", 1.0, lower=1e-3, upper=1e3, meaning="stiffening of the fibres"),
             Parameter("angle", "rad", 0.0, lower=-7.0, upper=7.0, scale=0.3, meaning="of the fibres, from x to y"),
             Parameter("elevation", "rad", 0.0, lower=-7.0, upper=7.0, scale=0.3, meaning="of the fibres, towards z"),
-            Parameter("spread", "rad", 0.0, 0.0, np.pi / 2, "half the angle of two families", scale=0.3, frozen=True),
+            *([spread] if self.families == 2 else []),
             Parameter("compression", "1", 0.0, lower=0.0, upper=1.0, frozen=True, meaning="share when shortened"),
         )
 
     def energy(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
-        spread = p.get("spread", 0.0)
+        if self.families == 1:
+            return self._family(p, strain, p["angle"])
+        spread = p["spread"]
         return 0.5 * (self._family(p, strain, p["angle"] + spread) + self._family(p, strain, p["angle"] - spread))
 
     @staticmethod
