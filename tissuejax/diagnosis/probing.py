@@ -77,7 +77,7 @@ class ProbingBench(Bench):
         bench.ready, bench.model = ready, model
         bench.finite = kept_samples(sample, segments)
         bench.runs = Runs({FINE: ready, COARSE: ready.with_settings(rough)}, {}, segments, y, bench.finite, keep)
-        bench.kind = FINE
+        bench.kind, bench.shift = FINE, None
         bench._declare(names)
         return bench
 
@@ -130,7 +130,8 @@ class ProbingBench(Bench):
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:
         """See `Bench.predict`; NaN where a simulation broke down."""
         wanted = tuple(recordings or (*self.fitted, *self.held_out))
-        return self.runs.many([(self.at(values), wanted, self.kind)])[0]
+        told = self.runs.many([(self.at(values), wanted, self.kind)])[0]
+        return told if self.shift is None else told + self.shift
 
     def jacobian(
         self, values: Mapping[str, float], paths: Sequence[str], recordings: Sequence[str] | None = None

@@ -91,8 +91,7 @@ def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
         if math.isfinite(trial.chi2):
             trials.append((trial.chi2, score.key, trial))
     trials.sort(key=lambda t: t[0])
-    before = s.misfit.residual(s.bench.runs.many([(parent.values, s.bench.fitted, COARSE)])[0], s.bench.fitted)
-    whole = float(before @ before)
+    whole = parent.chi2
     grown: list[frozenset] = []
     for chi2, key, trial in trials:
         if len(grown) == most:
@@ -135,11 +134,13 @@ def step(s: Search, parent: Refit, score: Score) -> Refit:
     still = np.zeros((len(bench.y), len(candidate.shapes)))  # shapes mean nothing at zero amplitude
     seed = s.misfit.whiten(np.concatenate([old, new, still], axis=1), names)
     start = {**parent.values, **score.setting}
-    bench.kind = COARSE
+    # what the cheap mesh has wrong at the parent is taken off, or whatever takes up that error would be preferred
+    coarse = bench.runs.many([(bench.at(parent.values), names, COARSE)])[0]
+    bench.kind, bench.shift = COARSE, np.where(bench.mask(names), parent.prediction - coarse, 0.0)
     try:
         return refit(bench, s.misfit, (*parent.keys, score.key), start, iterations=1, final=False, seed=seed)
     finally:
-        bench.kind = FINE
+        bench.kind, bench.shift = FINE, None
 
 
 def finish(s: Search, keys: tuple[str, ...], start: Refit) -> Refit:
