@@ -8,6 +8,7 @@ from pathlib import Path
 
 import jax
 import numpy as np
+from matplotlib.figure import Figure
 
 from tissuejax.energies.catalogue import volumetric
 from tissuejax.energies.published import published
@@ -176,6 +177,33 @@ def study_site(body: Lobe, name: str, rng: np.random.Generator) -> dict:
     }  # fmt: skip
 
 
+def draw(rows: dict, folder: Path) -> None:
+    """Force error against the number of simulations, both ways, site by site."""
+    figure = Figure(figsize=(8.5, 2.8), layout="constrained")
+    for ax, (name, row) in zip(figure.subplots(1, 3, sharey=True), rows.items(), strict=True):
+        for label, runs, color in (
+            ("stress curve", row["stress_curve"]["turns"], "#b65a1e"),
+            ("gradients", row["gradients"]["runs"], "#1f5fa8"),
+        ):
+            force = [
+                run["force_N"] if run["force_N"] is not None and np.isfinite(run["force_N"]) else None for run in runs
+            ]
+            done = [(i + 1, f) for i, f in enumerate(force) if f is not None]
+            ax.semilogy(*zip(*done, strict=True), "o-", color=color, markersize=4, linewidth=1.2, label=label)
+            if len(done) < len(force):
+                ax.annotate("can't be simulated", done[-1], (6, 4), textcoords="offset points", fontsize=7, color=color)
+        ax.axhline(0.010, color="#777777", linewidth=0.8, linestyle=":", label="aim")
+        ax.axhline(3**0.5 * FORCE_NOISE, color="#cccccc", linewidth=0.8, label="noise")
+        ax.set(title=name, xlabel="simulations", xticks=range(1, 6))
+        ax.title.set_fontsize(9)
+        ax.tick_params(labelsize=8)
+        ax.spines[["top", "right"]].set_visible(False)
+    figure.axes[0].set_ylabel("force RMSE, N")
+    figure.axes[-1].legend(fontsize=7, frameon=False)
+    (folder / "figures").mkdir(exist_ok=True)
+    figure.savefig(folder / "figures" / "errors.png", dpi=100)
+
+
 def main(folder: Path) -> str:
     """Write result.json; returns the answer in a sentence."""
     body, rows = lobe(), {}
@@ -183,6 +211,7 @@ def main(folder: Path) -> str:
         rows[name] = study_site(body, name, np.random.default_rng([2012, i]))
         write_json(folder / "result.json", rows)
         print(name, {k: (v["force_N"], v["marker_m"]) for k, v in rows[name].items() if "force_N" in v}, flush=True)
+    draw(rows, folder)
     best = [r["gradients"]["force_N"] for r in rows.values()]
     manual = [min(turn["force_N"] for turn in r["stress_curve"]["turns"]) for r in rows.values()]
     listed = [", ".join(f"{x:.4f}" for x in values) for values in (best, manual)]
