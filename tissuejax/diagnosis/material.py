@@ -258,7 +258,7 @@ class MaterialBench(Bench):
             full = any(e in self._full for e in model.effects)
             inner = 1.0 + 1.5 * memory + 4 * fibres + 3 * full
             swelling = (8.0 if memory else 3.0) if "compressibility" in names else 1.0
-            rig = (8.0 if fibres else 5.0) if "machine-compliance" in names else 1.0
+            rig = (8.0 if fibres or memory else 5.0) if "machine-compliance" in names else 1.0
             self._prices[model] = inner * swelling * rig
         return self._prices[model]
 

@@ -5,7 +5,8 @@ about as well as those effects do. So a periodic load counts only where what it 
 
 1. it explains more of each recording than a parabola in time, which has as many parameters;
 2. it is steady: one strength through a recording explains most of what one in every part of it would;
-3. where several recordings are long enough to show it, one strength explains most of what one in each would.
+3. where several recordings are long enough to show it, one strength explains most of what one in each would, and
+   where one is too short it is not far stronger there: an arc of a slow sine fits any short recording.
 
 All in whitened residuals, with the rest of the fit as it stands. Exponents of fibres or of an energy that rest on their
 limit describe no law: the recordings then ask for something that is not there below some stretch.
@@ -48,10 +49,11 @@ def periodic(bench: Bench, misfit: Misfit, r: Refit) -> tuple[str, ...]:
     part = r.prediction - bench.predict({**values, **off})
     left = bench.y - r.prediction
     gained = smooth = together = apart = 0.0
-    strengths = []
+    strengths, brief = [], []
     for s in bench.segments:
         time = s.time - s.time[0]
         if frequency * time[-1] < CYCLES:
+            brief.append(s.recording)
             continue
         white = misfit.noises[s.channel].whiten
         scale = bench.sigma[s.rows]
@@ -85,6 +87,12 @@ def periodic(bench: Bench, misfit: Misfit, r: Refit) -> tuple[str, ...]:
     a, w = (np.array(x) for x in zip(*strengths))
     if len(a) > 1 and (share := np.sum(w * a) ** 2 / (np.sum(w) * np.sum(w * a * a))) < COMMON:
         out.append(f"it differs between recordings: one strength explains {share:.0%}")
+    for name in dict.fromkeys(brief):
+        both = [f"{PERIODIC}{f}.{name}" for f in ("sin", "cos")]
+        if all(p in r.values for p in both):
+            there, error = np.hypot(*(values[p] for p in both)), max(r.std[p] for p in both)
+            if there - 3 * error > 2 * np.sum(w * a) / np.sum(w):
+                out.append(f"it is far stronger in {name}, which is too short to show it")
     return tuple(out)
 
 
