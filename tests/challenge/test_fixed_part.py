@@ -18,7 +18,7 @@ CASES = {  # name: (number, category, which effect or stray comes first)
     "slack": (30, "one", 10),
     "aging": (12, "one", 6),
     "drift": (12, "one", 7),
-    "warmed": (11, "unknown", 3),
+    "stick-slip": (11, "unknown", 8),
 }
 
 
