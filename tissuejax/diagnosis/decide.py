@@ -93,7 +93,9 @@ def needed(s: Search, larger: Refit, smaller: Refit) -> bool:
         noise = quality(s, larger).noise and (not quality(s, smaller).noise or veiled(s, smaller))
         least = max(seen, NEEDED / 4 * sum(excess(s, s.empty))) if s.bench.dear else 3 * GAIN
         return noise and gained > least and (outside > GAIN / 2 or not larger.n_held)
-    return outside > 0 or share > HELPLESS or not larger.n_held
+    # of a misfit no larger than noise (only its correlation tells) any share is a share of next to nothing
+    missing = sum(excess(s, s.empty)) > SIGNIFICANT * math.sqrt(2 * (larger.n + larger.n_held))
+    return outside > 0 or (share > HELPLESS and (missing or s.bench.dear)) or not larger.n_held
 
 
 def worse(s: Search, r: Refit) -> bool:
