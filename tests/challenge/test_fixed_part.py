@@ -18,7 +18,11 @@ CASES = {  # name: (number, category, which effect or stray comes first)
     "slack": (30, "one", 10),
     "aging": (12, "one", 6),
     "drift": (12, "one", 7),
-    "stick-slip": (11, "unknown", 8),
+    "stick-slip": (
+        11,
+        "unknown",
+        8,
+    ),  # an easy stranger: a warming would test abstention harder, at five times the cost
 }
 
 
