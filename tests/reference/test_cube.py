@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import outside
+from tests.reference.static_cube import sunk
 from tissuejax.energies.reduced_polynomial import ReducedPolynomial
 from tissuejax.energies.volumetric import Compressibility
 from tissuejax.mesh.columns import box
@@ -49,7 +50,8 @@ def test_the_published_displacement(sinking):
 
 def test_mean_peak_and_history_of_the_independent_solvers(sinking):
     """`cube_transient.csv`: mean at rest and its peak within 1 % of the mixed elements, centre within 1 % of those with
-    one point; before the first wave arrives the histories agree to the printed digits."""
+    one point; before the first wave arrives the histories agree to the printed digits. (The file's cube sinks 0.9 %
+    less than other solvers say: see `static_cube`.)"""
     _, z = sinking
     with outside("reference", "cube_transient.csv").open() as file:
         rows = {(r["kind"], r["hg"]): r for r in csv.DictReader(file) if (r["D"], r["rho"]) == ("0.001", "981")}
@@ -67,7 +69,10 @@ def test_mean_peak_and_history_of_the_independent_solvers(sinking):
 
 
 @pytest.mark.slow
-def test_the_mesh_converged_cube():
-    """11.895 +- 0.005 mm at the centre when mesh-converged (`reference/README.md`)."""
+def test_the_cube_of_an_independent_static_solver():
+    """At rest on 20 x 20 x 20: centre and mean of the top within 0.2 % of mixed elements solved statically
+    (`static_cube`); one-point integration and its hourglass stiffness are the difference."""
     _, z = cube(20, STEP / 2)
-    assert z[-1, 10, 10] == pytest.approx(11.895, rel=0.005)
+    mixed = 1e3 * sunk(20, 0.1, [VALUES[f"C{i}0"] for i in (1, 2, 3, 4)], 1e-3, 981.0)
+    assert z[-1, 10, 10] == pytest.approx(mixed[10, 10], rel=0.002)
+    assert z[-1].mean() == pytest.approx(mixed.mean(), rel=0.002)
