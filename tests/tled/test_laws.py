@@ -123,23 +123,25 @@ def test_a_bedding_slips_by_its_law():
     assert np.abs(share @ np.asarray(slip.viscous)[1]) < 1e-3 * fluid * felt.sum() * interval
 
 
-def test_friction_slides_at_its_limit_and_sticks_below():
+@pytest.mark.parametrize("give", [0.0, 1.5e-8])
+def test_friction_slides_at_its_limit_and_sticks_below(give):
     """A platen pressed on and dragged across a block that is held all round: |drag| = mu x push once it slides, and the
-    spring's stiffness times the way before."""
+    stiffness of the penalty's spring and of what gives, in series, times the way before."""
     g = box(SIZE, (3, 2, 2))
     rigid = Geometry(g.points, g.cells, g.cell_type, np.arange(len(g.points)))
     scene = cases.plain(rigid, np.arange(2.0))
     top = np.asarray(scene.body.facets)
     up = np.isclose(np.asarray(g.points)[top][:, :, 2], SIZE[2]).all(1)
     probe = build.probe(scene, Platen(), np.arange(2.0), np.tile([0, 0, SIZE[2]], (2, 1)), top[up], 1e8, 1e-7)
-    probe = scene.put({"probe": probe}).put({"probe.friction": jnp.asarray(0.25)}).probe
+    probe = scene.put({"probe": probe}).put({"probe.friction": jnp.asarray(0.25)})
+    probe = probe.put({"probe.give": jnp.asarray(give)}).probe
     patch = contact.patch(scene.put({"probe": probe}))
     u = jnp.zeros_like(scene.body.points.T)
     deep = SIZE[2] - 1e-5
     above = jnp.array([0, 0, SIZE[2] + 1e-5])
     grip = contact.forces(probe, patch, u, above, contact.untouched(probe)).grip
     push = 1e8 * 1e-5 * AREA
-    for way, drag in ((1e-6, 1e8 * 1e-6 * AREA), (4e-6, 0.25 * push)):
+    for way, drag in ((1e-6, 1e-6 / (1e-8 + give) * AREA), (2.6 * (1e-6 + 100 * give), 0.25 * push)):
         felt = contact.forces(probe, patch, u, jnp.array([way, 0, deep]), grip)
         assert float(felt.force[2]) == pytest.approx(push, rel=1e-6)
         assert float(felt.force[0]) == pytest.approx(-drag, rel=1e-6)

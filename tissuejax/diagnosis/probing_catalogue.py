@@ -84,7 +84,13 @@ def probing_entries(energy: float) -> list[Entry]:
                 Form("each recording", ("depth",), {}, each=("depth",)),
             ),
         ),
-        (Friction(), (Form("", ("coefficient",), {}),)),
+        (
+            Friction(),
+            (
+                Form("", ("coefficient",), {}),
+                Form("giving", ("coefficient", "give"), {}, nominated=False),
+            ),
+        ),
         (Adhesion(), (Form("", ("strength", "reach"), {"reach": (1e-4, 3e-4, 8e-4)}),)),
         (Capsule(), (Form("", ("stiffness",), {}),)),
         (BaseSlip(), (Form("", ("compliance", "fluidity"), {}),)),

@@ -14,6 +14,10 @@ from tissuejax.tled.scene import Scene
 class Friction(Effect):
     """Tangential traction up to `coefficient` times the contact pressure, against sliding. Neutral: 0.
 
+    A sticking point moves by `give` times its traction before it slides (a film of fluid, roughness that bends). Where
+    friction is strong most of the surface sticks: a straight press then tells the give, and the coefficient only where
+    the probe is drawn sideways.
+
     Reveals: lateral force and hysteresis wherever the probe slides or the surface slips under it, markers near the
     probe dragged along. Blind: a shallow straight press, where the surface hardly slides.
     """
@@ -22,13 +26,19 @@ class Friction(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
     reveals: ClassVar[str] = "lateral force against sliding, and its sign change on the way back"
     blind: ClassVar[str] = "a shallow straight press on a level surface; material tests"
-    source: ClassVar[str] = "Coulomb; Lister 2012, 2.2.4 assumes 0.1"
+    source: ClassVar[str] = (
+        "Coulomb; Lister 2012, 2.2.4 assumes 0.1; the give before sliding: Dahl 1968, Aerospace report TOR-0158"
+    )
     amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter("coefficient", "1", 0.0, 0.0, 2.0, "friction over normal force", scale=0.1),)
+        return (
+            Parameter("coefficient", "1", 0.0, 0.0, 2.0, "friction over normal force", scale=0.1),
+            Parameter("give", "m/Pa", 0.0, 0.0, 3e-7, "way before sliding per traction", scale=1e-8),
+        )
 
     def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
         already = scene.probe.friction
-        return scene.put({"probe.friction": p["coefficient"] if already is None else already + p["coefficient"]})
+        rubbing = p["coefficient"] if already is None else already + p["coefficient"]
+        return scene.put({"probe.friction": rubbing, "probe.give": scene.probe.give + p["give"]})

@@ -3,8 +3,8 @@
 Contact at the nodes drives the hourglass modes of one-point elements and loses up to half the force, so pressure acts
 at 3 x 3 Gauss points of each quadrilateral (six points of a triangle), over reference areas. The pressure is
 p = penalty * softness * softplus(-gap / softness). Friction is Coulomb's law made regular by a tangential spring of the
-same stiffness: a point sticks until the spring carries mu p, then it slides. Adhesion pulls at points that have
-touched, sigma (gap/reach) exp(1 - gap/reach), until the gap is five times `reach`.
+same stiffness, in series with what `give` says: a point sticks until the spring carries mu p, then it slides. Adhesion
+pulls at points that have touched, sigma (gap/reach) exp(1 - gap/reach), until the gap is five times `reach`.
 """
 
 from typing import NamedTuple
@@ -117,11 +117,12 @@ def _friction(probe, x, normal, pressure, anchor):
     square = sum(s * s for s in stretch)
     some = square > 0
     length = jnp.sqrt(jnp.where(some, square, 1.0))
-    limit = probe.friction * pressure / probe.penalty
+    spring = probe.penalty / (1.0 + probe.penalty * probe.give)
+    limit = probe.friction * pressure / spring
     kept = jnp.where(some, jnp.minimum(1.0, limit / length), 1.0)
     kept_stretch = tuple(kept * s for s in stretch)
     anchor = tuple(a - s for a, s in zip(x, kept_stretch, strict=True))
-    return tuple(-probe.penalty * s for s in kept_stretch), anchor
+    return tuple(-spring * s for s in kept_stretch), anchor
 
 
 def depth(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Array, " 3"]) -> Float[Array, ""]:

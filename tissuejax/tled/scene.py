@@ -89,6 +89,7 @@ class Probe(eqx.Module):
         penalty: pressure per penetration, Pa/m.
         softness: length over which contact sets in, m (softplus).
         friction: Coulomb coefficient; neutral 0.
+        give: tangential way a sticking point moves per traction before it slides, m/Pa, beside the penalty's own.
         adhesion: greatest pull at separation, Pa; neutral 0.
         reach: gap at which the pull is greatest, m; bonds are gone at five times that.
         offset: shift of the whole path (mounting), m; neutral 0.
@@ -104,6 +105,7 @@ class Probe(eqx.Module):
     penalty: Float[Array, ""]
     softness: Float[Array, ""]
     friction: Float[Array, ""] | None = None
+    give: Float[Array, ""] | float = 0.0
     adhesion: Float[Array, ""] | None = None
     reach: Float[Array, ""] | float = 2e-4
     offset: Float[Array, " 3"] | None = None
