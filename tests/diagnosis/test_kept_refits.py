@@ -72,7 +72,7 @@ def test_what_was_kept_of_another_sample_is_not_taken(tmp_path, counted):
 
 
 def test_a_search_ends_when_its_budget_is_spent_and_says_so():
-    found = diagnose(sample(), energy="neo-hookean", effects=("drift", "aging"), budget=Budget(most=2, spend=1.0))
+    found = diagnose(sample(), energy="neo-hookean", effects=("drift", "aging"), budget=Budget(most=2, spend=(1.0,)))
     assert any("budget was spent" in w for w in found.as_dict()["warnings"])
     assert [k for k in found.search.refits if k] == []
     assert found.verdict.kind == "unexplained"

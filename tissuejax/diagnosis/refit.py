@@ -209,6 +209,7 @@ def refit(
     iterations: int = 30,
     tolerance: float = 0.1,
     final: bool = True,
+    errors: bool = True,
     seed: np.ndarray | None = None,
 ) -> Refit:
     """Fit base and candidates `keys` from `start` (absent paths start at the bench's neutral values).
@@ -216,6 +217,7 @@ def refit(
     Args:
         tolerance: stops when two steps in a row lower chi-square by less.
         final: False leaves standard errors and held-out recordings out, for trial starts.
+        errors: False leaves standard errors out.
         seed: the whitened Jacobian at the start (natural coordinates, without priors) where it is known.
     """
     whole = {**bench.start, **start}
@@ -229,7 +231,7 @@ def refit(
     chi2 = float(r @ r) if np.isfinite(cost) else np.inf
     held = np.full(misfit.count(bench.held_out), np.inf)
     if final and np.isfinite(chi2):
-        std, at_bound = descent.errors(x, r)
+        std, at_bound = descent.errors(x, r) if errors else ({}, ())
         belong = tuple(p for key in keys for p in bench.candidates[key].held)
         if belong and bench.held_out:
             second = Descent(bench, misfit, belong, bench.held_out, values)

@@ -17,6 +17,7 @@ import numpy as np
 from tissuejax.diagnosis.bench import Bench, Candidate
 from tissuejax.diagnosis.kept_refits import KeptRefits
 from tissuejax.diagnosis.misfit import Misfit, estimated, white
+from tissuejax.diagnosis.neighbours import leave_out, reshape
 from tissuejax.diagnosis.plausible import doubts
 from tissuejax.diagnosis.quality import quality
 from tissuejax.diagnosis.refit import Refit
@@ -40,20 +41,21 @@ class Budget:
         tolerance: of a refit, in units of chi-square.
         finished: nominees refitted to the end at each size; the rest are dropped after a few steps.
         promise: share of the excess that the best pair must explain for a third effect to be sought.
-        spend: cost of predictions, in those of the base model, after which nothing larger is tried (`Bench.spent`).
+        spend: cost of all predictions so far, in those of the base model, after which nothing more is tried at a size
+            (`Bench.spent`); the last for leaving effects out in the end. 6e4 are about a minute of one processor.
         burden: searches and memories nested in a prediction at most (`Bench.burden`): three take a second a prediction.
     """
 
     most: int = 3
     beam: tuple[int, ...] = (1, 4, 2)
-    nominees: tuple[int, ...] = (9, 4, 3)
+    nominees: tuple[int, ...] = (9, 4, 5)
     share: float = 0.02
     starts: int = 2
     iterations: int = 30
     tolerance: float = 0.1
-    finished: tuple[int, ...] = (6, 4, 2)
+    finished: tuple[int, ...] = (6, 4, 3)
     promise: float = 0.6
-    spend: float = 3e4
+    spend: tuple[float, ...] = (3e4, 3e4, 6e4, 7e4)
     burden: int = 2
 
 
@@ -65,6 +67,8 @@ class Search:
         refits: by set of keys.
         scored: scores at each set that was extended.
         misfit: noise under which the refits are compared.
+        size: effects in the sets that are being extended.
+        dropped: sets that were given a few steps and left.
     """
 
     bench: Bench
@@ -74,6 +78,8 @@ class Search:
     scored: dict[frozenset, list[Score]] = field(default_factory=dict)
     report: Callable[[str], None] = lambda _: None
     kept: KeptRefits | None = None
+    size: int = 0
+    dropped: set[frozenset] = field(default_factory=set)
     _doubts: dict[frozenset, tuple[Refit, tuple[str, ...]]] = field(default_factory=dict)
 
     def __post_init__(self):
@@ -93,7 +99,8 @@ class Search:
     @property
     def exhausted(self) -> bool:
         """Whether what the search may spend is spent."""
-        return not self.bench.dear and self.bench.spent > self.budget.spend
+        spend = self.budget.spend
+        return not self.bench.dear and self.bench.spent > spend[min(self.size, len(spend) - 1)]
 
     @property
     def best(self) -> Refit:
@@ -109,6 +116,10 @@ class Search:
         """What r's parameters cost: Schwarz's k log n, n the number of independent samples that were fitted."""
         return r.k * math.log(max(self.misfit.effective(self.bench.fitted), 3.0))
 
+    def fitted(self, r: Refit) -> float:
+        """Schwarz's criterion: what the fitted recordings say of r."""
+        return (r.chi2 if self.bench.dear else surprise(r.chi2, r.n)) + self.inside(r)
+
     def outside(self, r: Refit) -> float:
         """Surprise of the held-out recordings, and the price of what they have for themselves."""
         held = r.held if self.bench.dear else surprise(r.held, r.n_held)
@@ -120,8 +131,7 @@ class Search:
         The first two are Schwarz's criterion; the third is minus twice the log predictive density of recordings that
         took no part in the fit, up to a constant, so the sum is one evidence-like number.
         """
-        fitted = r.chi2 if self.bench.dear else surprise(r.chi2, r.n)
-        return fitted + self.inside(r) + self.outside(r)
+        return self.fitted(r) + self.outside(r)
 
     def names(self, keys: frozenset) -> frozenset:
         """Effects in a set, whatever their form."""
@@ -198,56 +208,15 @@ class Search:
                 grown.append(key)
             else:
                 begun.setdefault(key, self.begun(order, starts))
-        for key, r in sorted(begun.items(), key=lambda kr: surprise(kr[1].chi2, kr[1].n) + self.inside(kr[1]))[:most]:
+        for key, r in sorted(begun.items(), key=lambda kr: self.fitted(kr[1]))[:most]:
             self.refits[key] = self.finished(r.keys, [r.values])
             grown.append(key)
         return grown
 
-    def begun(self, keys: tuple[str, ...], starts: list[Mapping[str, float]]) -> Refit:
-        """The best of several starts after a few iterations, without errors and held-out recordings."""
-        return min((self.refit(keys, s, iterations=5, final=False) for s in starts), key=lambda t: t.chi2)
-
-    def reshape(self, keys: frozenset) -> None:
-        """Try every effect of a set in its neighbouring forms, as long as that lowers the criterion."""
-        at = keys
-        for _ in range(4):
-            parent, trials = self.refits[at], []
-            if quality(self, parent).noise:
-                return
-            for old in parent.keys:
-                for new in self.bench.candidates[old].beside:
-                    key = at - {old} | {new}
-                    if key not in self.refits:
-                        if self.bench.burden(key) > self.budget.burden or self.exhausted:
-                            continue
-                        self.report(" + ".join([new if k == old else k for k in parent.keys]))
-                        starts = [{**parent.values, **setting} for setting in self.bench.candidates[new].grid]
-                        order = tuple(new if k == old else k for k in parent.keys)
-                        self.refits[key] = self.finished(order, starts[: self.budget.starts])
-                    trials.append(key)
-            trials = [k for k in trials if not self.doubts(k)]
-            best = min([at, *trials], key=lambda k: self.criterion(self.refits[k]))
-            if best == at:
-                return
-            at = best
-
-    def leave_out(self) -> None:
-        """Refit the best set without each of its effects in turn, in all forms; go on from the best of these.
-
-        From where the larger set came to rest, also if that was refitted before: an effect may have been called only
-        because the smaller set's own descent had stopped early.
-        """
-        at = None
-        while at != (at := frozenset(self.best.keys)):
-            parent = self.refits[at]
-            for key in parent.keys if len(parent.keys) > 1 else ():
-                smaller = at - {key}
-                order = tuple(k for k in parent.keys if k != key)
-                self.report(" + ".join(order))
-                known, begun = self.refits.get(smaller), self.begun(order, [parent.values])
-                if known is None or begun.chi2 < known.chi2 - 1.0:
-                    self.refits[smaller] = self.finished(order, [begun.values])
-                self.reshape(smaller)
+    def begun(self, keys: tuple[str, ...], starts: list[Mapping[str, float]], held: bool = False) -> Refit:
+        """The best of several starts after a few iterations, without errors; with held-out recordings if `held`."""
+        options = {"iterations": 5, "final": held, "errors": False}
+        return min((self.refit(keys, s, **options) for s in starts), key=lambda t: t.chi2)
 
     def finished(self, keys: tuple[str, ...], starts: list[Mapping[str, float]]) -> Refit:
         """The best of several starts, each given a few iterations before the winner is finished."""
@@ -324,6 +293,7 @@ def search(
         s.score(frozenset())
         return s
     for size in range(budget.most):
+        s.size = size
         at = [k for k in best_of_each(s) if len(k) == size][: budget.beam[min(size, len(budget.beam) - 1)]]
         most = budget.nominees[min(size, len(budget.nominees) - 1)]
         if not s.extend(s.extensions(at, most), budget.finished[min(size, len(budget.finished) - 1)]):
@@ -331,7 +301,7 @@ def search(
         if size == 0 and not bench.dear:
             renew_noise(s)
         for keys in best_of_each(s)[: 1 if bench.dear else (4, 2, 1)[min(size, 2)]]:
-            s.reshape(keys)
+            reshape(s, keys)
         best = s.best
         left = (best.chi2 - best.n) / max(s.empty.chi2 - s.empty.n, 1.0)
         if (
@@ -341,7 +311,8 @@ def search(
         ):
             break
     if not bench.dear:
-        s.leave_out()
+        s.size = budget.most
+        leave_out(s)
         if s.exhausted:
             bench.warnings.append(
                 "the search ended when its budget was spent: larger sets of effects were not all tried"
