@@ -9,6 +9,7 @@ from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_numerics import numerics
 from tissuejax.diagnosis.probing_runs import COARSE
+from tissuejax.diagnosis.probing_search import spread
 from tissuejax.diagnosis.refit import refit
 from tissuejax.energies.catalogue import energy
 from tissuejax.recordings.recording import Sample
@@ -49,6 +50,17 @@ def test_what_acts_in_one_recording_is_run_in_that_one(bench):
     count = bench.runs.count
     bench.predict(VALUES | {"effects.contact-offset.depth.b": 1e-4})
     assert bench.runs.count == count + 1
+
+
+def test_friction_that_may_give_starts_stronger_than_the_rigid_stick_that_was_found(bench):
+    """With presses alone, 0.18 without give and 0.46 with it are two minima (of a case with 0.42)."""
+    coefficient, give = "effects.friction.coefficient", "effects.friction.give"
+    begun = spread(bench, VALUES | {coefficient: 0.18}, "friction/giving")
+    assert begun[coefficient] > 0.4 and begun[give] > 0
+    found = VALUES | {coefficient: 0.3, give: 1e-8}
+    assert spread(bench, found, "inclusion/flat") | found == spread(bench, found, "inclusion/flat"), (
+        "moved what was found"
+    )
 
 
 @pytest.mark.parametrize(

@@ -35,6 +35,7 @@ from tissuejax.recordings.recording import Sample
 STEP, LOG_STEP = 0.15, 0.04  # of a parameter's scale; of its logarithm
 AGED = 0.5  # standard deviation of the logarithm of stiffness at the end of a session
 COLUMN = 0.5  # step of a score's column, of the amplitude's scale
+STRONGER, GIVE = 2.5, 2e-8  # friction to start from anew, of the one found; m/Pa: 500 Pa move by 10 micrometres
 
 
 class ProbingBench(Bench):
@@ -154,6 +155,14 @@ class ProbingBench(Bench):
             neutral = self.at(values).get(path, self.start[path])
             asked.append(({**self.at(values), **setting, path: neutral}, path, COLUMN * self.free[path].scale, wanted))
         return self._columns(asked)
+
+    def elsewhere(self, values: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
+        """Where the surface sticks, a rigid stick of weak friction passes for a giving one of strong friction, and no
+        step leads from one to the other; see `Bench.elsewhere`."""
+        if "effects.friction.give" not in values:
+            return ()
+        stronger = min(STRONGER * values["effects.friction.coefficient"], 1.0)
+        return ({"effects.friction.coefficient": stronger, "effects.friction.give": GIVE},)
 
     def _columns(self, asked: Sequence[tuple[dict, str, float, tuple[str, ...]]]) -> Float[np.ndarray, "N k"]:
         """Derivatives, one a (values, path, step, recordings); everything that has to run is run side by side."""

@@ -8,6 +8,7 @@ are refitted to the end, on the mesh that counts.
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -162,7 +163,7 @@ def richer(s: Search, at: frozenset) -> frozenset:
                 more = len(s.bench.candidates[new].paths) > len(s.bench.candidates[old].paths)
                 if more and keys not in s.refits:
                     s.report(" + ".join(new if k == old else k for k in parent.keys))
-                    start = Refit(**{**vars(parent), "values": spread(s.bench, parent.values, new)})
+                    start = replace(parent, values=spread(s.bench, parent.values, new))
                     s.refits[keys] = finish(s, tuple(new if k == old else k for k in parent.keys), start)
         forms = [k for k in s.refits if s.names(k) == s.names(at)]
         best = min(forms, key=lambda k: s.criterion(s.refits[k]))
@@ -173,13 +174,15 @@ def richer(s: Search, at: frozenset) -> frozenset:
 
 
 def spread(bench: Bench, values: dict[str, float], form: str) -> dict[str, float]:
-    """Values for a form whose parameters differ between recordings, from those common to all."""
+    """Values for a richer form: those common to all recordings for each of them, and from elsewhere if need be."""
     out = dict(values)
     for path in (*bench.candidates[form].paths, *bench.candidates[form].held):
         common = ".".join(path.split(".")[:3])
         if path not in out and common != path and common in values:
             out[path] = values[common]
-    return out
+    fresh = {p: bench.start[p] for p in bench.candidates[form].paths if p not in out}
+    other = next(iter(bench.elsewhere(out | fresh)), {})
+    return out | dict(other) if fresh.keys() & other.keys() else out
 
 
 def leave_out(s: Search, at: frozenset) -> None:
