@@ -56,11 +56,10 @@ def test_friction_that_may_give_starts_stronger_than_the_rigid_stick_that_was_fo
     """With presses alone, 0.18 without give and 0.46 with it are two minima (of a case with 0.42)."""
     coefficient, give = "effects.friction.coefficient", "effects.friction.give"
     begun = spread(bench, VALUES | {coefficient: 0.18}, "friction/giving")
-    assert begun[coefficient] > 0.4 and begun[give] > 0
+    assert begun[coefficient] > 0.4
+    assert begun[give] > 0
     found = VALUES | {coefficient: 0.3, give: 1e-8}
-    assert spread(bench, found, "inclusion/flat") | found == spread(bench, found, "inclusion/flat"), (
-        "moved what was found"
-    )
+    assert spread(bench, found, "inclusion/flat") == found
 
 
 @pytest.mark.parametrize(
