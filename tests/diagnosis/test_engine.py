@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from spring_bench import spring
 
-from tissuejax.diagnosis.decide import decide
+from tissuejax.diagnosis.decide import decide, stated
 from tissuejax.diagnosis.locate import locate
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.refit import refit
@@ -41,6 +41,39 @@ def test_two_effects_are_found_together():
     verdict = decide(search(spring({"relax.g": 0.15, "relax.tau": 1.0, "wave.s": 0.15, "wave.period": 2.3})))
     assert verdict.kind == "found"
     assert set(names(verdict)) == {"relax", "wave"}
+
+
+def test_three_effects_are_found_together():
+    truth = {"relax.g": 0.2, "relax.tau": 1.0, "wave.s": 0.2, "wave.period": 2.3, "form.c": 8.0}
+    verdict = decide(search(spring(truth)))
+    assert (verdict.kind, set(names(verdict))) == ("found", {"relax", "wave", "form"})
+    for path, true in truth.items():
+        assert verdict.chosen.values[path] == pytest.approx(true, abs=4 * verdict.chosen.std[path])
+
+
+def test_an_effect_that_is_a_small_share_beside_a_strong_one_is_kept_though_something_else_is_left():
+    bench = spring({"offset.value": 8.0, "relax.g": 0.25})
+    for s in bench.segments:
+        bench.y[s.rows] += 0.05 * np.sin(s.time**1.5)  # a law that isn't ours: as large as the noise
+    s = search(bench)
+    verdict = decide(s)
+    assert set(names(verdict)) == {"offset", "relax"}
+    assert not verdict.quality.noise
+    gained = s.refits[frozenset({"offset"})].chi2 - verdict.chosen.chi2
+    assert gained < 0.02 * s.empty.chi2
+
+
+def test_confidence_falls_with_what_a_name_leaves_and_rises_with_what_an_abstention_leaves():
+    s = search(spring({"relax.g": 0.2, "relax.tau": 0.6}))
+    chosen, before = s.refits[frozenset({"relax"})], (1e4, 1e4)
+    left = [0.0, 1.0, 100.0, 1000.0, 1e4]
+    named = [stated(s, "found", chosen, False, before, (x, x)) for x in left]
+    strange = [stated(s, "unexplained", chosen, False, before, (x, x)) for x in left]
+    assert named == sorted(named, reverse=True)
+    assert strange == sorted(strange)
+    assert stated(s, "found", chosen, True, before, (1e3, 1e3)) == pytest.approx(named[0])
+    assert max(named + strange) < 1
+    assert min(named[-1], strange[0]) < 0.01
 
 
 def test_an_effect_outside_the_catalogue_is_not_given_a_name():

@@ -4,8 +4,8 @@ Order of the questions, each with its own number:
 1. Is anything missing? The base fit's whitened chi-square and correlation against pure noise, in every recording,
    and whether any set lowers the criterion by more than `GAIN`.
 2. Which set? The smallest criterion; then every effect is asked whether it is needed: its removal must cost more than
-   `GAIN` and a share `NEEDED` of the misfit, or reach noise level where the smaller set doesn't, and the less it
-   explains the more the held-out recordings have to agree.
+   `GAIN` and a share `NEEDED` of the misfit, or take away a share `MOST` of what the smaller set leaves, or reach noise
+   level where the smaller set doesn't, and the less it explains the more the held-out recordings have to agree.
 3. Does it explain? What is left must be noise, or at most a share `LEFT` of what was missing, in the fitted recordings
    and in the held-out ones. Otherwise something is missing that the catalogue has no name for.
 4. Could it be another? Sets of no more effects whose criterion is within `CLOSE` can't be told apart by these data.
@@ -30,14 +30,13 @@ LEFT = 0.15
 LEFT_SEEN = 0.06  # the same where what is left exceeds the noise itself: a quarter of the size
 LEFT_DEAR, CLOSE_DEAR, SEEN_DEAR = 0.08, 0.01, 0.05  # where a prediction is a simulation
 TEMPER = 4.0
-# How often an answer of its kind should be right, by the weight of the chosen set, whether noise is left, and the
-# amplitude of what is left. Round numbers set on development cases; the challenge holds them against what was right.
-SURE = {
-    "nothing-missing": lambda w, noise, left: 0.95 * w,
-    "found": lambda w, noise, left: w * (0.97 if noise else 0.95 * (1 - left)),
-    "ambiguous": lambda w, noise, left: w * (0.97 if noise else 0.95 * (1 - left)),
-    "unexplained": lambda w, noise, left: min(0.95, 0.6 + 0.5 * left),
-}
+# How often an answer should be right: round numbers from development cases of material tests, after the opened seed
+# 88213 had shown that the former ones were too sure. Names that leave noise were right in nearly all, names that leave
+# a tenth of the amplitude in most, those that leave 18 % or more in none; abstentions that leave less than a third of
+# it in the fitted recordings were mostly wrong (an effect shown by the held-out one alone, one of several not found).
+NAMED, HALF_NAMED = 0.97, 0.16
+STRANGE, HALF_STRANGE = 0.95, 0.36
+NOTHING = 0.95
 # The same of probings, of which few have been graded: no answer is stated as all but certain.
 SURE_DEAR = {
     "nothing-missing": lambda noise, left: 0.9,
@@ -45,7 +44,7 @@ SURE_DEAR = {
     "ambiguous": lambda noise, left: 0.95 if noise else 0.85 * (1 - left),
     "unexplained": lambda noise, left: min(0.8, 0.5 + 0.5 * left),
 }
-FEWER = (1.0, 1.0, 0.93, 0.88)  # the more effects, the more ways to be wrong; a fourth is never tried
+FEWER = (1.0, 1.0, 0.98, 0.93)  # the more effects, the more ways to be wrong; a fourth is never tried
 
 
 @dataclass(frozen=True)
@@ -176,8 +175,7 @@ def decide(s: Search) -> Verdict:
     if s.bench.dear:
         sure = confidence(s, chosen) * SURE_DEAR[kind](after.noise, amplitude(e0, e1))
     else:
-        sure = SURE[kind](weight(s, chosen), after.noise, amplitude(e0, e1))
-        sure *= 1.0 if kind == "unexplained" else FEWER[min(len(chosen.keys), 3)]
+        sure = stated(s, kind, chosen, after.noise, e0, e1)
     return Verdict(kind, chosen, rivals, explained, tuple(reasons), before, after, sure)
 
 
@@ -189,7 +187,22 @@ def close(s: Search, chosen: Refit) -> float:
     return max(CLOSE, CLOSE_DEAR * (s.criterion(s.empty) - s.criterion(chosen))) if s.bench.dear else CLOSE
 
 
-def amplitude(before: tuple[float, float], after: tuple[float, float]) -> float:
+def stated(s: Search, kind: str, chosen: Refit, noise: bool, before: tuple, after: tuple) -> float:
+    """Probability that the answer is right, of material tests.
+
+    A name loses with rivals near in criterion, with the amplitude a of what is left (by 1 / (1 + (a / a0)^4)), and
+    with company. An abstention loses the more, the less is left in the fitted recordings.
+    """
+    if kind == "unexplained":
+        left = max(amplitude(before[:1], after[:1]), 1e-9)
+        return STRANGE / (1 + (HALF_STRANGE / left) ** 4)
+    if kind == "nothing-missing":
+        return NOTHING * weight(s, chosen)
+    left = 0.0 if noise else amplitude(before, after)
+    return NAMED * FEWER[min(len(chosen.keys), 3)] * weight(s, chosen) / (1 + (left / HALF_NAMED) ** 4)
+
+
+def amplitude(before: tuple[float, ...], after: tuple[float, ...]) -> float:
     """Size of what is left over that of what was missing."""
     return math.sqrt(min(sum(after) / max(sum(before), 1e-9), 1.0))
 

@@ -4,7 +4,8 @@ Greedy forward selection fails where two effects mask each other, so a beam of t
 every one scored anew at its own fit. A set reached once is never refitted. The noise is estimated anew from the
 best fit so far, since correlation can only be seen once the smooth mismatch is gone, and then all is compared
 under that one noise. In the end every effect of the best set is left out once, so that none stays that was only a
-stepping stone.
+stepping stone (`neighbours`). What may be spent is counted and grows with the size of the sets, so that pairs can't use
+up what sets of three need; a search that has found nothing but noise left stops before.
 """
 
 import itertools
@@ -55,7 +56,7 @@ class Budget:
     tolerance: float = 0.1
     finished: tuple[int, ...] = (6, 4, 3)
     promise: float = 0.6
-    spend: tuple[float, ...] = (3e4, 3e4, 6e4, 7e4)
+    spend: tuple[float, ...] = (3e4, 3e4, 5e4, 6e4)
     burden: int = 2
 
 
@@ -292,16 +293,20 @@ def search(
     if bench.dear and quality(s, first).noise:
         s.score(frozenset())
         return s
+    short = False
     for size in range(budget.most):
         s.size = size
         at = [k for k in best_of_each(s) if len(k) == size][: budget.beam[min(size, len(budget.beam) - 1)]]
         most = budget.nominees[min(size, len(budget.nominees) - 1)]
-        if not s.extend(s.extensions(at, most), budget.finished[min(size, len(budget.finished) - 1)]):
+        grown = s.extend(s.extensions(at, most), budget.finished[min(size, len(budget.finished) - 1)])
+        short |= s.exhausted
+        if not grown:
             break
         if size == 0 and not bench.dear:
             renew_noise(s)
         for keys in best_of_each(s)[: 1 if bench.dear else (4, 2, 1)[min(size, 2)]]:
             reshape(s, keys)
+        short |= s.exhausted
         best = s.best
         left = (best.chi2 - best.n) / max(s.empty.chi2 - s.empty.n, 1.0)
         if (
@@ -313,7 +318,7 @@ def search(
     if not bench.dear:
         s.size = budget.most
         leave_out(s)
-        if s.exhausted:
+        if short or s.exhausted:
             bench.warnings.append(
                 "the search ended when its budget was spent: larger sets of effects were not all tried"
             )
