@@ -1,0 +1,59 @@
+"""An inclusion that explains the sites pressed for the fit and not the next one is begun anew under another site."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tissuejax.diagnosis import probing_search
+from tissuejax.diagnosis.score import Score
+
+X, Y, Z, RADIUS = (f"effects.inclusion.{p}" for p in ("x", "y", "z", "radius"))
+HERE, DEEPER, THERE = ({X: x, Y: 0.0, Z: z, RADIUS: 6e-3} for x, z in ((-0.01, 0.01), (-0.01, 0.005), (0.01, 0.01)))
+SCORE = Score(
+    "inclusion/round",
+    100.0,
+    0.8,
+    {"effects.inclusion.contrast": 1.4},
+    HERE,
+    np.zeros(1),
+    ((100.0, {}, HERE), (99.0, {}, DEEPER), (80.0, {}, THERE)),
+)
+SOFT = {-0.01: 10.0, 0.01: 1.0}  # held-out chi-square per sample, by where the fit began: stiff here, soft there
+
+
+@dataclass
+class Fit:
+    keys: tuple[str, ...]
+    x: float
+    held: float
+    chi2: float = 1.0
+    n: int = 1
+    n_held: int = 1
+
+
+@pytest.fixture
+def search(monkeypatch):
+    begun = []
+
+    def step(s, parent, score):
+        begun.append(score.setting)
+        return Fit((score.key,), score.setting[X], np.inf)
+
+    monkeypatch.setattr(probing_search, "step", step)
+    monkeypatch.setattr(probing_search, "finish", lambda s, keys, trial: Fit(keys, trial.x, SOFT[trial.x]))
+    return SimpleNamespace(begun=begun, report=lambda _: None, criterion=lambda r: r.chi2 + r.held)
+
+
+def test_the_held_out_recording_sends_an_inclusion_under_another_site(search):
+    first = Fit((SCORE.key,), -0.01, SOFT[-0.01])
+    found = probing_search.under_another_site(search, None, SCORE, first)
+    assert search.begun == [THERE], "another depth under the same site is within reach of a refit"
+    assert found.x == 0.01
+
+
+@pytest.mark.parametrize("fit", [Fit((), -0.01, 1.0), Fit((), -0.01, 10.0, chi2=3.0)])
+def test_nothing_is_begun_anew_where_all_is_explained_or_the_fitted_recordings_are_not(search, fit):
+    assert probing_search.under_another_site(search, None, SCORE, fit) is fit
+    assert not search.begun
