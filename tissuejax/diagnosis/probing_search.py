@@ -29,6 +29,7 @@ PROMISING = 0.1  # of the best score: the least for a step
 RIVALS = 0.3  # of the best step's gain: the least for a refit; a step from far off tells little
 SETTLED, NEARLY = 0.03, 1.3  # share of the base's excess, and chi-square per sample, that a found effect may leave
 CLOSE = 0.85  # the same, once one refit leaves nothing but noise
+BRIEF, LACKING = 3, 0.25  # iterations without one effect, and the share of what was missing that makes it needed
 ELSEWHERE = 0.5  # of the best place's gain: the least for an inclusion to be tried under another site
 
 
@@ -145,11 +146,11 @@ def step(s: Search, parent: Refit, score: Score) -> Refit:
         bench.kind, bench.shift = FINE, None
 
 
-def finish(s: Search, keys: tuple[str, ...], start: Refit) -> Refit:
-    """A refit to the end, from where a trial or another form came to."""
-    budget = s.budget
+def finish(s: Search, keys: tuple[str, ...], start: Refit, iterations: int | None = None) -> Refit:
+    """A refit to the end (or so many iterations), from where a trial or another form came to."""
     values = {**start.values, **start.own}
-    return refit(s.bench, s.misfit, keys, values, iterations=budget.iterations, tolerance=budget.tolerance)
+    iterations = iterations or s.budget.iterations
+    return refit(s.bench, s.misfit, keys, values, iterations=iterations, tolerance=s.budget.tolerance)
 
 
 def under_another_site(s: Search, parent: Refit, score: Score, found: Refit) -> Refit:
@@ -203,11 +204,16 @@ def spread(bench: Bench, values: dict[str, float], form: str) -> dict[str, float
 
 
 def leave_out(s: Search, at: frozenset) -> None:
-    """Refits of a set without each of its effects, so that none stays that was only a stepping stone."""
+    """Refits of a set without each of its effects, so that none stays that was only a stepping stone.
+
+    They begin where the set came to rest, so a few iterations tell whether the rest can do without an effect at all.
+    """
     parent = s.refits[at]
+    far = parent.chi2 + LACKING * (s.empty.chi2 - parent.chi2)
     for key in parent.keys:
         smaller = at - {key}
         if smaller not in s.refits:
             order = tuple(k for k in parent.keys if k != key)
             s.report(" + ".join(order))
-            s.refits[smaller] = finish(s, order, parent)
+            brief = finish(s, order, parent, BRIEF)
+            s.refits[smaller] = brief if brief.converged or brief.chi2 > far else finish(s, order, brief)
