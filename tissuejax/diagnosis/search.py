@@ -25,6 +25,7 @@ from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.score import Score, scores
 from tissuejax.errors import NotConverged
 
+LEAST = 2  # sets finished at each size, whatever they cost
 ALLOWED = 1.5  # chi-square per sample up to which a fit explains its recordings
 
 
@@ -49,7 +50,7 @@ class Budget:
 
     most: int = 3
     beam: tuple[int, ...] = (1, 4, 2)
-    nominees: tuple[int, ...] = (9, 4, 5)
+    nominees: tuple[int, ...] = (9, 4, 7)
     share: float = 0.02
     starts: int = 2
     iterations: int = 30
@@ -186,7 +187,8 @@ class Search:
     def extend(self, extensions: list[tuple[frozenset, Score]], most: int) -> list[frozenset]:
         """Refits of sets with one candidate more, from its most promising settings; remembered.
 
-        All are given a few steps, and the `most` of smallest criterion in the fitted recordings are finished.
+        All are given a few steps, and the `most` of smallest criterion in the fitted recordings are finished, as
+        long as there is something to spend.
         """
         grown, begun = [], {}
         for keys, score in extensions:
@@ -210,6 +212,8 @@ class Search:
             else:
                 begun.setdefault(key, self.begun(order, starts))
         for key, r in sorted(begun.items(), key=lambda kr: self.fitted(kr[1]))[:most]:
+            if len(grown) >= LEAST and self.exhausted:
+                break
             self.refits[key] = self.finished(r.keys, [r.values])
             grown.append(key)
         return grown
