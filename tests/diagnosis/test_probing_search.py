@@ -1,4 +1,4 @@
-"""An inclusion that explains the sites pressed for the fit and not the next one is begun anew under another site."""
+"""The search of probings without simulations: where an inclusion is begun anew, and how long a set does without one."""
 
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -31,6 +31,7 @@ class Fit:
     chi2: float = 1.0
     n: int = 1
     n_held: int = 1
+    converged: bool = False
 
 
 @pytest.fixture
@@ -57,3 +58,21 @@ def test_the_held_out_recording_sends_an_inclusion_under_another_site(search):
 def test_nothing_is_begun_anew_where_all_is_explained_or_the_fitted_recordings_are_not(search, fit):
     assert probing_search.under_another_site(search, None, SCORE, fit) is fit
     assert not search.begun
+
+
+def test_a_set_that_can_do_without_an_effect_is_finished_and_one_that_cannot_is_not(monkeypatch):
+    both = Fit(("a", "b"), 0.0, 1.0, chi2=10.0)
+    begun, left = [], {("a",): 12.0, ("b",): 60.0}  # of 100: without b a little is lost, without a half
+
+    def finish(s, keys, start, iterations=None):
+        begun.append((keys, iterations))
+        return Fit(keys, 0.0, 1.0, chi2=left[keys])
+
+    monkeypatch.setattr(probing_search, "finish", finish)
+    s = SimpleNamespace(refits={frozenset("ab"): both}, empty=Fit((), 0.0, 1.0, chi2=100.0), report=lambda _: None)
+    probing_search.leave_out(s, frozenset("ab"))
+    assert begun == [(("b",), probing_search.BRIEF), (("a",), probing_search.BRIEF), (("a",), None)]
+    assert {k: s.refits[k].chi2 for k in (frozenset("a"), frozenset("b"))} == {
+        frozenset("a"): 12.0,
+        frozenset("b"): 60.0,
+    }
