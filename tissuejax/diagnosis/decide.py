@@ -32,10 +32,10 @@ LEFT_DEAR, CLOSE_DEAR, SEEN_DEAR = 0.08, 0.01, 0.05  # where a prediction is a s
 TEMPER = 4.0
 # How often an answer should be right: round numbers from development cases of material tests, after the opened seed
 # 88213 had shown that the former ones were too sure. Names that leave noise were right in nearly all, names that leave
-# less than a twentieth of the amplitude too, those that leave a tenth in half, those that leave 15 % or more in none,
+# less than a twentieth of the amplitude too, those that leave a tenth in half, those that leave 15 % or more in few,
 # nor those beside a larger set that the criterion prefers by hundreds and that was not believed; abstentions that
 # leave less than a third of it in the fitted recordings were mostly wrong (one of several effects not found).
-NAMED, HALF_NAMED, HALF_SLIGHTED = 0.97, 0.11, 300.0
+NAMED, HALF_NAMED, HALF_SLIGHTED = 0.97, 0.12, 300.0
 STRANGE, HALF_STRANGE = 0.95, 0.3
 NOTHING = 0.95
 # The same of probings, of which few have been graded: no answer is stated as all but certain.
@@ -198,18 +198,18 @@ def stated(s: Search, kind: str, chosen: Refit, noise: bool, before: tuple, afte
 
     A name loses with rivals near in criterion (`weight`), with company (`FEWER`), and where noise is not all that is
     left with the amplitude a of the rest and the criterion c by which a larger set was better and not believed: by
-    1 / (1 + (a / a0)^4) and 1 / (1 + c / c0). An abstention loses the more, the less is left in the fitted recordings.
+    1 / (1 + (a / a0)^3) and 1 / (1 + c / c0). An abstention loses the more, the less is left in the fitted recordings.
     """
     if kind == "unexplained":
         left = max(amplitude(before[:1], after[:1]), 1e-9)
-        return STRANGE / (1 + (HALF_STRANGE / left) ** 4)
+        return STRANGE / (1 + (HALF_STRANGE / left) ** 3)
     if kind == "nothing-missing":
         return NOTHING * weight(s, chosen)
     sure = NAMED * FEWER[min(len(chosen.keys), 3)] * weight(s, chosen)
     if noise:
         return sure
     slighted = s.criterion(chosen) - min(s.criterion(r) for r in believed(s))
-    return sure / (1 + (amplitude(before, after) / HALF_NAMED) ** 4) / (1 + max(slighted, 0.0) / HALF_SLIGHTED)
+    return sure / (1 + (amplitude(before, after) / HALF_NAMED) ** 3) / (1 + max(slighted, 0.0) / HALF_SLIGHTED)
 
 
 def amplitude(before: tuple[float, ...], after: tuple[float, ...]) -> float:
