@@ -21,6 +21,14 @@ def test_a_failing_job_raises_here():
         workers.run_all([(_fails, 0, np.zeros(2))] * 3, 2)
 
 
+def test_programs_are_compiled_ahead_on_both_sides():
+    x = [np.arange(6.0), np.arange(7.0)]
+    assert workers.run_all([(_square, 5, a) for a in x], 2, programs.compiled) == [None, None]
+    known = len(programs._compiled)
+    assert all(np.allclose(o, 5 * a**2) for o, a in zip(workers.run_all([(_square, 5, a) for a in x], 2), x))
+    assert len(programs._compiled) <= known + 1  # this process compiled one of the two and may be asked for the other
+
+
 def test_inside_a_transformation_a_program_is_a_function():
     assert jax.grad(lambda x: programs.run(_square, 2, x).sum())(jnp.ones(3)).tolist() == [4.0, 4.0, 4.0]
 

@@ -78,9 +78,8 @@ class ProbingPredictor(Predictor):
 
     def run(self, values: Values) -> dict[str, Simulated]:
         """The simulations behind `predict`, with their checks."""
-        thetas = {name: _vector(local(self.model, values, name)) for name in self.names}
         jobs = [self.job(values, name) for name in self.names]
-        out = dict(zip(self.names, self._side_by_side(jobs, thetas), strict=True))
+        out = dict(zip(self.names, self._side_by_side(jobs), strict=True))
         for name, run in out.items():
             self._refuse_failed(name, run)
         return out
@@ -94,20 +93,9 @@ class ProbingPredictor(Predictor):
         for path in paths:
             if path not in self.model.parameters:
                 raise unknown("parameter", path, self.model.parameters)
-        bare = self.model.across(())
-        declared = list(self.model.declared)
-        thetas, jobs, place = {}, [], []
-        for name in self.names:
-            thetas[name] = _vector(local(self.model, values, name))
-            basis = np.zeros((len(paths), len(declared)))
-            for i, path in enumerate(paths):
-                basis[i] = [path in self.model.source_of(generic, name) for generic in declared]
-            felt = np.flatnonzero(basis.any(1))
-            for part in _parts(felt, self.settings.tangents):
-                jobs.append((_linearised, bare, thetas[name], self.setups[name], basis[part]))
-                place.append((name, part))
+        jobs, place = self.derivative_jobs(values, paths)
         recordings, tangents = {}, {path: {} for path in paths}
-        for (name, part), (run, slopes) in zip(place, self._side_by_side(jobs, thetas), strict=True):
+        for (name, part), (run, slopes) in zip(place, self._side_by_side(jobs), strict=True):
             self._refuse_failed(name, run)
             recordings[name] = self._reported(name, run.channels)
             for row, i in enumerate(part):
@@ -120,9 +108,23 @@ class ProbingPredictor(Predictor):
                 tangents[path].setdefault(name, zero)
         return recordings, tangents
 
-    def _side_by_side(self, jobs: list, thetas: Mapping[str, Array]) -> list:
+    def derivative_jobs(self, values: Values, paths: Sequence[str]) -> tuple[list[workers.Job], list[tuple]]:
+        """What simulates and differentiates every recording, a few paths at a time, and (recording, paths) of each."""
+        bare, declared, jobs, place = self.model.across(()), list(self.model.declared), [], []
+        for name in self.names:
+            theta = _vector(local(self.model, values, name))
+            basis = np.zeros((len(paths), len(declared)))
+            for i, path in enumerate(paths):
+                basis[i] = [path in self.model.source_of(generic, name) for generic in declared]
+            felt = np.flatnonzero(basis.any(1))
+            for part in _parts(felt, self.settings.tangents):
+                jobs.append((_linearised, bare, theta, self.setups[name], basis[part]))
+                place.append((name, part))
+        return jobs, place
+
+    def _side_by_side(self, jobs: list) -> list:
         """Run the jobs on as many processes as the settings say; in order and here where values are traced."""
-        if any(isinstance(t, jax.core.Tracer) for t in thetas.values()):
+        if any(isinstance(theta, jax.core.Tracer) for _, _, theta, *_ in jobs):
             return [programs.run(*job) for job in jobs]
         return workers.run_all(jobs, self.settings.processes)
 
@@ -154,6 +156,44 @@ class ProbingPredictor(Predictor):
         """Values as simulated, cut to the samples (and markers) that recording and channel have."""
         shape = np.shape(self.sample.recordings[name].channels[channel].values)
         return values[tuple(slice(n) for n in shape)]
+
+
+def predict_all(predictors: Sequence[ProbingPredictor], values: Values) -> list[dict[str, Recording]]:
+    """`predict` of several predictors, all their simulations side by side; put the longest ones first.
+
+    Raises:
+        UnstableSimulation: a run broke down.
+    """
+    jobs = [p.job(values, name) for p in predictors for name in p.names]
+    done = iter(workers.run_all(jobs, max((p.settings.processes for p in predictors), default=1)))
+    told = []
+    for p in predictors:
+        runs = {name: next(done) for name in p.names}
+        for name, run in runs.items():
+            p._refuse_failed(name, run)
+        told.append({name: p._reported(name, run.channels) for name, run in runs.items()})
+    return told
+
+
+def make_ready(
+    derivatives: Sequence[ProbingPredictor],
+    predictions: Sequence[ProbingPredictor],
+    values: Values,
+    paths: Sequence[str],
+) -> None:
+    """Compile the programs of a fit ahead, different ones on different cores; later each is found on disk.
+
+    With one process nothing is gained, and nothing is done.
+    """
+    jobs = {}
+    for p in derivatives:
+        for job, (_, part) in zip(*p.derivative_jobs(values, paths), strict=True):
+            jobs.setdefault(("derivative", p.settings.counts, len(part)), job)
+    for p in predictions:
+        jobs.setdefault(("prediction", p.settings.counts), p.job(values, p.names[0]))
+    processes = max(p.settings.processes for p in derivatives)
+    if processes > 1:
+        workers.run_all(list(jobs.values()), processes, programs.compiled)
 
 
 def _parts(indices: np.ndarray, size: int) -> list[np.ndarray]:

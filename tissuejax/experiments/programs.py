@@ -28,6 +28,17 @@ def run(function: Callable, static: Any, *arguments: Any) -> Any:
     if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(arguments)):
         return function(static, *arguments)
     arguments = jax.tree.map(jnp.asarray, arguments)
+    program = _program(function, static, *arguments)
+    with _running:
+        return jax.block_until_ready(program(*arguments))
+
+
+def compiled(function: Callable, static: Any, *arguments: Any) -> None:
+    """Have the program of `run` compiled (and kept on disk), without running it."""
+    _program(function, static, *jax.tree.map(jnp.asarray, arguments))
+
+
+def _program(function: Callable, static: Any, *arguments: Any) -> Callable:
     leaves, structure = jax.tree.flatten(arguments)
     key = (function, static, structure, tuple((leaf.shape, leaf.dtype) for leaf in leaves))
     if key not in _compiled:
@@ -35,5 +46,4 @@ def run(function: Callable, static: Any, *arguments: Any) -> Any:
             if key not in _compiled:
                 jitted = jax.jit(function, static_argnums=0, compiler_options=COMPILER_OPTIONS)
                 _compiled[key] = jitted.lower(static, *arguments).compile()
-    with _running:
-        return jax.block_until_ready(_compiled[key](*arguments))
+    return _compiled[key]

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,9 +45,9 @@ class Worker:
         )  # fmt: skip
         atexit.register(self.close)
 
-    def ask(self, job: Job) -> Any:
+    def ask(self, job: Job, do: Callable) -> Any:
         """The result of one job; an exception of the job is raised here."""
-        pickle.dump(jax.device_get(job), self.process.stdin)
+        pickle.dump((do, jax.device_get(job)), self.process.stdin)
         self.process.stdin.flush()
         fine, answer = pickle.load(self.process.stdout)
         if not fine:
@@ -64,12 +64,13 @@ class Worker:
 _workers: list[Worker] = []
 
 
-def run_all(jobs: Sequence[Job], processes: int) -> list:
+def run_all(jobs: Sequence[Job], processes: int, do: Callable = programs.run) -> list:
     """Results of all jobs in order, on the host; this process takes them from the front, each worker from the back.
 
     Args:
         jobs: (function, static, *arguments); the function has to be importable.
         processes: this one included.
+        do: what is done with a job, `programs.run` or `programs.compiled`.
     """
     waiting, results = deque(range(len(jobs))), [None] * len(jobs)
     failures: list[BaseException] = []
@@ -81,7 +82,7 @@ def run_all(jobs: Sequence[Job], processes: int) -> list:
             except IndexError:
                 return
             try:
-                results[i] = worker.ask(jobs[i])
+                results[i] = worker.ask(jobs[i], do)
             except (EOFError, BrokenPipeError, pickle.PicklingError):  # a lost worker: its job is done here
                 waiting.appendleft(i)
                 _workers.remove(worker)
@@ -102,7 +103,7 @@ def run_all(jobs: Sequence[Job], processes: int) -> list:
                 i = waiting.popleft()
             except IndexError:
                 break
-            results[i] = jax.device_get(programs.run(*jobs[i]))
+            results[i] = jax.device_get(do(*jobs[i]))
         for thread in threads:
             thread.join()
         if failures:
@@ -120,11 +121,11 @@ def serve_pipe() -> None:
     os.dup2(2, 1)
     while True:
         try:
-            job = pickle.load(sys.stdin.buffer)
+            do, job = pickle.load(sys.stdin.buffer)
         except EOFError:
             return
         try:
-            reply = (True, jax.device_get(programs.run(*job)))
+            reply = (True, jax.device_get(do(*job)))
         except Exception as error:
             reply = (False, error)
         pickle.dump(reply, answers)

@@ -1,10 +1,9 @@
-"""Fit of probings: few simulations, coarse derivatives under fine residuals, and errors that include the numerical one.
+"""Fit of probings: few simulations, a swift descent, a fine end, and errors that include the numerical one.
 
-The derivatives come from a run twice as fast (half the steps), the residuals from the run that counts: Gauss-Newton
-needs no better direction, and a Jacobian costs five forward runs. The end is a step on a finer mesh with the last
-derivatives. Standard errors hold two parts: noise, and how far
-the estimate moves when mesh, step and penalty are changed (a linear shift: the change of the prediction through the
-Jacobian).
+Where to go is found by runs four times as fast as the one that counts: their own error moves the estimate by a few
+standard errors, their derivatives are right to a per cent. The end (`closing`) are chord steps on the finer mesh with
+the last derivatives. Standard errors hold two parts: noise, and how far the estimate moves when mesh, step and penalty
+are changed (a linear shift: the change of the prediction through the Jacobian).
 """
 
 import hashlib
@@ -19,9 +18,10 @@ from jaxtyping import Float
 
 from tissuejax import storage
 from tissuejax.errors import InputError
-from tissuejax.experiments.probing_predictor import ProbingPredictor
-from tissuejax.experiments.probing_settings import REFINED
+from tissuejax.experiments.probing_predictor import ProbingPredictor, make_ready
 from tissuejax.fitting.advice import warnings_of
+from tissuejax.fitting.closing import Told, changes, close
+from tissuejax.fitting.closing import shifts as numerical_shifts
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
@@ -29,12 +29,9 @@ from tissuejax.fitting.sparing import sparing
 from tissuejax.fitting.stability import recorded_stability
 from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
 from tissuejax.progress import Progress, Silent
-from tissuejax.recordings.recording import Recording
 
 METHOD = "sparing"
-# what is left to the limit, over the change just seen: the mesh error falls with h^2 and the final mesh is the finer
-# one; inertia with the compression squared, from f to f/2; the error of a penalty with its inverse, doubled
-REMAINS = {"mesh": 1 / (REFINED**2 - 1), "step": 4 / 3, "penalty": 2.0}
+LAST = 15.0  # standard errors: after a step shorter than this the rest is left to the chord steps of the end
 
 
 @dataclass(frozen=True)
@@ -81,8 +78,8 @@ def fit_probed(
     Args:
         problem: predictor, free parameters, start, noise, bounds, priors.
         holdout: recordings of the same sample to predict and score only.
-        numerical: estimate the numerical error (three more forward runs).
-        finish: move to the finer mesh at the end (two more forward runs there); needs a graded mesh.
+        numerical: estimate the numerical error (three more forward runs, one of them on the finer mesh).
+        finish: move to the finer mesh at the end (one or two more forward runs there); needs a graded mesh.
         checkpoint: a file that keeps the last accepted values; a fit of the same problem goes on from there.
         max_steps: Jacobians at most.
         fraction: converged once the next step is shorter than this many standard errors.
@@ -97,50 +94,34 @@ def fit_probed(
     if not isinstance(fine, ProbingPredictor):
         raise InputError("fit_probed takes a predictor of probings; use fit for material tests")
     begun = time.perf_counter()
-    coarse = replace(problem, predictor=fine.with_settings(fine.settings.coarse))
-    box, spent, told = problem.box, {"forward": 0, "jacobian": 0}, Told()
     kept = Checkpoint(checkpoint, problem)
     start = kept.values()
     with (progress or Silent()).stage(f"fitting {', '.join(fine.names)}", None) as stage:
-
-        def residuals(y):
-            spent["forward"] += 1
-            stage.advance(note="simulation")
-            r = told.residuals(problem, problem.values(box.bounded(y)[0]))
-            kept.before = kept.before or vector_errors(problem, r)
-            return r
-
-        def jacobian(y):
-            spent["jacobian"] += 1
-            stage.advance(note="derivatives")
-            x, slope = box.bounded(y)
-            return coarse.linearised(problem.values(x))[1] * slope
-
-        def accepted(n, cost, y):
-            values = problem.values(box.bounded(y)[0])
-            kept.keep(values)
-            stage.advance(0, note=f"chi-square {2 * cost:.5g}")
-            if on_accept is not None:
-                on_accept(n, 2 * cost, values)
-
-        y = box.free(problem.vector(start))
-        descent, r, J = sparing(jacobian, residuals, y, max_steps=max_steps, fraction=fraction, on_accept=accepted)
-        x, slope = box.bounded(descent.y)
-        J, cost = J / slope, descent.cost
+        runs = Runs(problem, stage, kept, on_accept)
+        stage.advance(note="programs")
+        finest = fine.with_settings(fine.settings.finer) if finish or numerical else fine
+        make_ready([runs.swift.predictor], [finest, fine], start, problem.free)
+        y = problem.box.free(problem.vector(start))
+        kept.before = kept.before or vector_errors(problem, runs.begin(y))
+        descent, _, J = sparing(
+            runs.jacobian, runs.residuals, y, max_steps=max_steps, fraction=fraction, last=LAST, on_accept=runs.accepted
+        )
+        x, slope = problem.box.bounded(descent.y)
+        J = J / slope
         kept.keep(problem.values(x))
-        stage.advance(note="numerical error")
-        shifts, sizes = numerical_shifts(problem, problem.values(x), r, J, told) if numerical else ({}, {})
-        if finish:
-            stage.advance(note="finer mesh")
-            problem, x, r = finished(problem, x, J, told)
-            cost = 0.5 * float(r @ r)
+        stage.advance(note="numerical error" if numerical else "the fine simulation")
+        seen = changes(problem, problem.values(x), runs.told, finish, numerical)
+        shifts, sizes = numerical_shifts(problem, seen.left, J)
+        stage.advance(note="finer mesh" if finish else "last steps")
+        problem, x, r, left = close(problem, x, J, seen, runs.told, finish, holdout, runs.better)
+        cost = 0.5 * float(r @ r)
         final, values = problem.predictor, problem.values(x)
         kept.keep(values)
         before, after = kept.before, vector_errors(problem, r)
-        fitted = dict(told(problem, values))
+        fitted = dict(runs.told.all([final], values)[0])
         stage.advance(note="held out")
-        held = dict(final.of(holdout).predict(values)) if holdout else {}
-    spent["forward"] = told.runs
+        held = dict(runs.told.all([final.of(holdout)], values)[0]) if holdout else {}
+    status = "the last steps are still long" if left >= LAST else "converged" if descent.converged else descent.reason
     noise_part = _noise_part(problem, x, J, r)
     spread = _with_shifts(noise_part, [np.array(list(s.values())) for s in shifts.values()])
     measured = fine.sample.recordings
@@ -150,18 +131,21 @@ def fit_probed(
             std[f"{name}/{channel}"] = series.noise_std or std.get(f"{fine.names[0]}/{channel}", 1.0)
     found = Fit(
         problem=problem,
-        status="converged" if descent.converged else descent.reason,
+        status=status,
         values=values,
         uncertainty=spread,
-        at_bound={p: side for p, side in zip(problem.free, box.at_bound(x), strict=True) if side},
+        at_bound={p: side for p, side in zip(problem.free, problem.box.at_bound(x), strict=True) if side},
         chi2=2 * cost,
         channels=scores(measured, fitted, std),
         holdout=scores(measured, held, std),
         predictions=fitted | held,
-        trace=[Iterate(i, 2 * c, problem.values(box.bounded(y)[0])) for i, (c, y) in enumerate(descent.trace, 1)],
+        trace=[
+            Iterate(i, 2 * c, problem.values(problem.box.bounded(y)[0]))
+            for i, (c, y) in enumerate([*descent.trace, (cost, problem.box.free(x))], 1)
+        ],
         stability=recorded_stability(final, values),
         starts=[2 * cost],
-        n_evaluations=descent.n_evaluations,
+        n_evaluations=runs.told.runs + runs.jacobians,
         seconds=time.perf_counter() - begun,
         method=METHOD,
         sites={
@@ -174,7 +158,60 @@ def fit_probed(
         found.warnings.append(_numerical_sentence(problem.free, shifts, noise_part))
     kept.done()
     noise_std = dict(zip(problem.free, map(float, noise_part.std), strict=True))
-    return ProbedFit(found, shifts, sizes, noise_std, spent)
+    return ProbedFit(found, shifts, sizes, noise_std, {"forward": runs.told.runs, "jacobian": runs.jacobians})
+
+
+class Runs:
+    """The simulations of a fit: what the descent asks for, in its own coordinates y, told and counted.
+
+    Attributes:
+        swift: the problem simulated fast, for residuals and derivatives of the descent.
+        told: forward runs made so far.
+        jacobians: how many were computed.
+    """
+
+    def __init__(self, problem: Problem, stage, kept: "Checkpoint", on_accept: Callable | None):
+        self.problem, self.stage, self.kept, self.on_accept = problem, stage, kept, on_accept
+        fine = problem.predictor
+        self.swift = replace(problem, predictor=fine.with_settings(fine.settings.swift))
+        self.coarse = replace(problem, predictor=fine.with_settings(fine.settings.coarse))
+        self.told, self.jacobians, self.first = Told(), 0, {}
+
+    def begin(self, y: Float[np.ndarray, " p"]) -> Float[np.ndarray, " n"]:
+        """Residuals at the start, which come with the derivatives there and are kept with them."""
+        self.stage.advance(note="derivatives")
+        self.jacobians += 1
+        x, slope = self.problem.box.bounded(y)
+        r, J = self.swift.linearised(self.problem.values(x))
+        self.first[y.tobytes()] = r, J * slope
+        return r
+
+    def residuals(self, y: Float[np.ndarray, " p"]) -> Float[np.ndarray, " n"]:
+        """Of the swift simulation."""
+        if y.tobytes() in self.first:
+            return self.first[y.tobytes()][0]
+        self.stage.advance(note="simulation")
+        return self.told.residuals(self.swift, self.problem.values(self.problem.box.bounded(y)[0]))
+
+    def jacobian(self, y: Float[np.ndarray, " p"]) -> Float[np.ndarray, "n p"]:
+        """Of the swift simulation, to y."""
+        if y.tobytes() not in self.first:
+            self.begin(y)
+        return self.first[y.tobytes()][1]
+
+    def better(self, x: Float[np.ndarray, " p"]) -> Float[np.ndarray, "n p"]:
+        """Jacobian to the parameters themselves, of a simulation nearer to the one that counts."""
+        self.stage.advance(note="derivatives")
+        self.jacobians += 1
+        return self.coarse.linearised(self.problem.values(x))[1]
+
+    def accepted(self, n: int, cost: float, y: Float[np.ndarray, " p"]) -> None:
+        """Keep an accepted step, show it and tell it."""
+        values = self.problem.values(self.problem.box.bounded(y)[0])
+        self.kept.keep(values)
+        self.stage.advance(0, note=f"chi-square {2 * cost:.5g}")
+        if self.on_accept is not None:
+            self.on_accept(n, 2 * cost, values)
 
 
 def vector_errors(problem: Problem, residuals: Float[np.ndarray, " n"]) -> dict[str, dict[str, float]]:
@@ -185,73 +222,6 @@ def vector_errors(problem: Problem, residuals: Float[np.ndarray, " n"]) -> dict[
         error = residuals[rows] * problem.sigma(key)
         found.setdefault(key[0], {})[key[1]] = float(np.sqrt(3 * np.mean(error**2)))
     return found
-
-
-class Told:
-    """Predictions made so far, so that nothing is simulated twice."""
-
-    def __init__(self):
-        self.made: dict[tuple, Mapping[str, Recording]] = {}
-
-    def __call__(self, problem: Problem, values: Mapping[str, float]) -> Mapping[str, Recording]:
-        """The prediction of the fitted recordings."""
-        key = (problem.predictor.settings, *sorted(values.items()))
-        if key not in self.made:
-            self.made[key] = problem.predictor.predict(dict(values))
-        return self.made[key]
-
-    def residuals(self, problem: Problem, values: Mapping[str, float]) -> Float[np.ndarray, " n"]:
-        """Its residuals."""
-        return problem.misfit(self(problem, values), values)
-
-    @property
-    def runs(self) -> int:
-        """How many were simulated."""
-        return len(self.made)
-
-
-def finished(problem: Problem, x: Float[np.ndarray, " p"], jacobian: Float[np.ndarray, "n p"], told: Told):
-    """The problem on the finer mesh, the estimate after one step there with given derivatives, and its residuals."""
-    settings = problem.predictor.settings
-    finer = replace(problem, predictor=problem.predictor.with_settings(settings.finer))
-    before = told.residuals(finer, finer.values(x))
-    step = x - np.linalg.lstsq(jacobian, before, rcond=None)[0]
-    lower, upper = (np.array(v) for v in zip(*(problem.bound(path) for path in problem.free), strict=True))
-    step = np.clip(step, lower, upper)
-    after = told.residuals(finer, finer.values(step))
-    return (finer, step, after) if after @ after < before @ before else (finer, x, before)
-
-
-def numerical_shifts(
-    problem: Problem,
-    values: Mapping[str, float],
-    residuals: Float[np.ndarray, " n"],
-    jacobian: Float[np.ndarray, "n p"],
-    told: Told,
-) -> tuple[dict[str, dict[str, float]], dict[str, float]]:
-    """How far mesh, step and penalty hold the estimate off its limit, and how far the prediction moves.
-
-    Data that stay while the prediction changes by d move the estimate by -(J'J)^-1 J'd. From the change to the next
-    setting the distance to the limit follows by the order of convergence (`REMAINS`).
-
-    Args:
-        problem: with the predictor whose settings are varied.
-        values: the estimate.
-        residuals: there.
-        jacobian: of the residuals to the free parameters, at the estimate.
-        told: keeps the predictions.
-    """
-    predictor = problem.predictor
-    shifts, squares = {}, {}
-    for choice, settings in predictor.settings.varied.items():
-        other = told.residuals(replace(problem, predictor=predictor.with_settings(settings)), values)
-        change = REMAINS[choice] * (other - residuals)
-        for key, rows in problem.rows.items():
-            d = change[rows] * problem.sigma(key)
-            squares["/".join(key)] = squares.get("/".join(key), 0.0) + float(np.mean(d**2))
-        move = -np.linalg.lstsq(jacobian, change, rcond=None)[0]
-        shifts[choice] = dict(zip(problem.free, map(float, move), strict=True))
-    return shifts, {key: value**0.5 for key, value in squares.items()}
 
 
 def _noise_part(problem: Problem, x, J, r) -> Uncertainty:

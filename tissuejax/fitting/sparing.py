@@ -34,6 +34,7 @@ def sparing(
     max_steps: int = 20,
     fraction: float = 0.1,
     longest: float = 1.0,
+    last: float = 0.5,
     on_accept: Callable[[int, float, np.ndarray], None] | None = None,
 ) -> Ended:
     """Minimise half the sum of squares of the residuals from `y`.
@@ -45,6 +46,7 @@ def sparing(
         max_steps: Jacobians at most.
         fraction: converged once the next step is shorter than this many standard errors (scaled by the misfit).
         longest: no coordinate moves farther in a step.
+        last: standard errors; after an accepted step shorter than this a further one would be shorter by far.
         on_accept: called with the number of runs, cost and point of every accepted step (progress, checkpoint).
 
     Raises:
@@ -89,7 +91,7 @@ def sparing(
         if not accepted:
             reason = "no nearby point is better, though the derivatives promise one"
             break
-        if whole and errors < 0.5 and fraction >= 0.1:  # a further step would be shorter by far
+        if whole and errors < last and fraction >= 0.1:
             trace.append((cost, y))
             return ended("converged")
     return ended(reason or f"no convergence after {n} runs")
