@@ -240,7 +240,7 @@ def picture(answers: dict) -> bytes:
         ax.axhline(1, color=INK, linewidth=0.6, linestyle=":")
         words = " + ".join(record["effects"]) or "nothing"
         ax.set(yscale="log", xlabel=f"{region}: sites, by misfit")
-        ax.set_title(f"{record['verdict']}: {words}", fontsize=7.5, loc="left")
+        ax.set_title(f"{record['verdict']}:\n{words}", fontsize=7.5, loc="left")
     axes[0].set_ylabel("RMS residual / noise")
     axes[0].legend(frameon=False, fontsize=8)
     return png(figure)
