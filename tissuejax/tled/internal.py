@@ -2,7 +2,8 @@
 
 The stages are kept apart by optimisation barriers: XLA on CPU would otherwise copy strain and stress into each of the
 24 force outputs and compute them again there (3 to 5 times slower). Barriers survive only if a program is compiled
-with `simulate.COMPILER_OPTIONS`; without them the result is the same and slower.
+with `simulate.COMPILER_OPTIONS`; without them the result is the same and slower. Large bodies are taken in blocks whose
+intermediate results (1.2 kB an element) stay in a core's own cache: a fifth to a quarter faster.
 """
 
 from typing import Any, NamedTuple
@@ -11,14 +12,15 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from tissuejax.elements.element import cofactor, determinant, parts
+from tissuejax.elements.element import Forces, cofactor, determinant, parts
 from tissuejax.energies.strain import Strain
 from tissuejax.tensors import Sym
 from tissuejax.tled.history import relax
 from tissuejax.tled.scene import Scene
 
 barrier = jax.lax.optimization_barrier
-BLOCK = 64  # elements are padded to whole vectors and cache lines: an odd number costs up to half as much again
+LINE = 64  # elements are padded to whole vectors and cache lines: an odd number costs up to half as much again
+BLOCK = 256  # elements at most that are taken together, in bodies of more than two such blocks
 
 
 class Mesh(NamedTuple):
@@ -46,7 +48,7 @@ def mesh(scene: Scene) -> Mesh:
     """Reference quantities; differentiable in points, density and stiffness."""
     body, tissue = scene.body, scene.tissue
     count, k = body.cells.shape
-    padding = -count % BLOCK
+    padding = padded(count) - count
     cells = jnp.concatenate([body.cells, jnp.broadcast_to(body.cells[-1:], (padding, k))]).T
     reference = body.element.reference(take(body.points.T, cells))
     present = (jnp.arange(count + padding) < count).astype(body.points.dtype)
@@ -57,6 +59,17 @@ def mesh(scene: Scene) -> Mesh:
     nodal_volume = add(shares, cells, len(body.points))
     averaged = nodal_volume if body.element.averaged_pressure else None
     return Mesh(cells, reference, stiffness, tissue.density * nodal_volume, averaged)
+
+
+def blocks(count: int) -> int:
+    """In how many blocks so many elements are taken."""
+    return -(-count // BLOCK) if count > 2 * BLOCK else 1
+
+
+def padded(count: int) -> int:
+    """Elements with those added that fill whole blocks of whole lines."""
+    n = blocks(count)
+    return n * LINE * -(-count // (n * LINE))
 
 
 def take(u: Float[Array, "... N"], cells: Int[Array, "k E"]) -> Float[Array, "... k E"]:
@@ -209,9 +222,36 @@ def forces(scene: Scene, mesh: Mesh, u: Float[Array, "3 N"], history: History, s
 
     Total Lagrangian: f_a = sum_e V_e P . B_a with P = F S (Lister 2012, 4.3.1).
     """
+    rows, count = parts(u), blocks(len(mesh.stiffness))
+    if count == 1 or scene.body.element.averaged_pressure:
+        fe, history = contributions(scene, mesh, rows, history, step)
+        return barrier(jnp.stack(barrier(tuple(add(f, mesh.cells, len(mesh.mass)) for f in fe)))), history
+    size = len(mesh.stiffness) // count
+
+    def block(i, carried):
+        def cut(a):
+            return jax.lax.dynamic_slice_in_dim(a, i * size, size, a.ndim - 1)
+
+        def put(whole, part):
+            return jax.lax.dynamic_update_slice_in_dim(whole, part, i * size, whole.ndim - 1)
+
+        f, history = carried
+        *some, before = barrier(jax.tree.map(cut, (mesh.cells, mesh.reference, mesh.stiffness, history)))
+        part = mesh._replace(cells=some[0], reference=some[1], stiffness=some[2])
+        fe, after = contributions(scene, part, rows, before, step)
+        f = barrier(tuple(g.at[part.cells].add(x, mode="promise_in_bounds") for g, x in zip(f, fe, strict=True)))
+        return f, jax.tree.map(put, history, after)
+
+    none = tuple(jnp.zeros(len(mesh.mass), u.dtype) for _ in rows)
+    f, history = jax.lax.fori_loop(0, count, block, (none, history))
+    return barrier(jnp.stack(f)), history
+
+
+def contributions(scene: Scene, mesh: Mesh, u, history: History, step) -> tuple[Forces, History]:
+    """What each element of `mesh` adds at its nodes, N; displacements and forces one array a component."""
     element = scene.body.element
     shear = scene.settings.hourglass * scene.tissue.energy.initial_shear_modulus(scene.tissue.energy_values)
-    ue = barrier(take(u, mesh.cells))
+    ue = barrier(jnp.stack(barrier(tuple(take(row, mesh.cells) for row in u))))
     F, memory = barrier(element.gradient(mesh.reference, ue))
     C = barrier(cauchy_green(F))
     S, history = barrier(stress(scene, mesh, C, history, step))
@@ -220,8 +260,7 @@ def forces(scene: Scene, mesh: Mesh, u: Float[Array, "3 N"], history: History, s
         p, _ = averaged_pressure(scene, mesh, F)
         P = P + p * cofactor(F)
     P = barrier(P)
-    fe = barrier(element.forces(mesh.reference, P, memory, shear * mesh.stiffness))
-    return barrier(jnp.stack(barrier(tuple(add(f, mesh.cells, len(mesh.mass)) for f in fe)))), history
+    return barrier(element.forces(mesh.reference, P, memory, shear * mesh.stiffness)), history
 
 
 def internal_energy(scene: Scene, mesh: Mesh, u: Float[Array, "3 N"]):
