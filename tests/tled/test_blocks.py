@@ -1,5 +1,7 @@
 """A large body is taken in blocks of elements; that changes neither its forces nor their derivatives."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,6 +11,7 @@ from tests.tled import cases
 from tissuejax.mesh.columns import box
 from tissuejax.tled import internal
 from tissuejax.tled.history import Prony
+from tissuejax.tled.simulate import COMPILER_OPTIONS
 
 
 @pytest.mark.parametrize("count", [1, 512, 513, 1000, 1536, 3872, 27000])
@@ -27,20 +30,20 @@ def test_forces_memory_and_their_derivatives_are_those_of_all_elements_at_once(m
     scene = scene.put({"tissue.prony": prony})
     u, du = (1e-4 * rng.normal(size=(3, len(body.points))) for _ in range(2))
 
-    def forces(u):
+    @partial(jax.jit, compiler_options=COMPILER_OPTIONS)
+    def derived(scene, u, du):
         mesh = internal.mesh(scene)
-        f, history = internal.forces(scene, mesh, jnp.asarray(u), internal.rest(scene, mesh), 1.0)
-        return f, jax.tree.map(lambda a: a[:210], history)
 
-    @jax.jit
-    def derived(u, du):
+        def forces(u):
+            f, history = internal.forces(scene, mesh, u, internal.rest(scene, mesh), 1.0)
+            return f, jax.tree.map(lambda a: a[:210], history)
+
         told, slopes = jax.jvp(forces, (u,), (du,))
-        back = jax.vjp(lambda u: forces(u)[0], u)[1](told[0])[0]
-        return told, slopes, back
+        return told, slopes, jax.vjp(lambda u: forces(u)[0], u)[1](told[0])[0]
 
     def all_of_it():
         derived.clear_cache()  # the blocks are chosen when it is traced
-        return jax.tree.leaves(derived(u, du))
+        return jax.tree.leaves(derived(scene, u, du))
 
     monkeypatch.setattr(internal, "BLOCK", 256)
     assert internal.blocks(210) == 1
