@@ -38,7 +38,7 @@ def cube(n: int, order: int, dtype, steps: int = 0):
         box((0.1, 0.1, 0.1), (n, n, n)), ReducedPolynomial(order=order), Quadratic(), values, dict(K=2000.0), 981.0,
         np.arange(20) * 1e-3, gravity=(0, 0, -9.81),
     )  # fmt: skip
-    step = float(scene.clock.step)
+    step = 0.5 * float(scene.clock.step)  # a corner of 27,000 hexes stiffens beyond the safe step at rest
     return scene.put({"clock.interval": jnp.asarray(steps * step), "clock.steps": steps}).cast(dtype)
 
 
@@ -52,8 +52,9 @@ def cpu(program, *arguments) -> float:
 def measure(scenes: dict, rounds: int = 5) -> dict:
     """Best nanoseconds an element and step of each scene, taken in turns."""
     best = dict.fromkeys(scenes, float("inf"))
-    for scene in scenes.values():
-        jax.block_until_ready(compiled(scene))
+    for name, scene in scenes.items():
+        if int(compiled(scene).failed) >= 0:
+            raise RuntimeError(f"{name} breaks down: the time of such a run says nothing")
     for _ in range(rounds):
         for name, scene in scenes.items():
             work = len(scene.body.cells) * scene.clock.frames * scene.clock.steps
