@@ -45,6 +45,8 @@ def search_probing(bench: ProbingBench, budget: Budget, report: Callable[[str], 
     near = refit(bench, s.misfit, (), {}, iterations=2 * budget.iterations, tolerance=budget.tolerance, final=False)
     bench.kind = FINE
     first = refit(bench, s.misfit, (), near.values, iterations=budget.iterations, tolerance=budget.tolerance)
+    if not math.isfinite(first.chi2):  # what the cheap mesh bears may be unstable on the fine one: from the start again
+        first = refit(bench, s.misfit, (), {}, iterations=2 * budget.iterations, tolerance=budget.tolerance)
     if not math.isfinite(first.chi2):
         raise NotConverged(
             f"the base model can't be simulated for {', '.join(bench.fitted)}: name another --energy, or look at the "
