@@ -6,7 +6,7 @@ from tissuejax.errors import InputError, unknown
 
 MESHES = ("graded", "file")
 REFINED = 1.35
-SWIFT = 20.0  # compression at which forces of a probing at 10 mm/s are still off by a few per cent only
+SWIFT = 20.0  # compression: in p01 the derivatives are those at 10 to one per cent, and the misfit too
 
 
 @dataclass(frozen=True)
