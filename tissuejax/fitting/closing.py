@@ -117,6 +117,7 @@ def close(
     finer: bool,
     holdout: tuple[str, ...] = (),
     derive: Derive | None = None,
+    on_accept: Callable[[Float[np.ndarray, " p"], float], None] | None = None,
 ) -> Closing:
     """Chord steps until a further one would be shorter than a standard error, or than a tenth of the numerical one.
 
@@ -132,6 +133,7 @@ def close(
         finer: end on the finer mesh.
         holdout: recordings to predict in the same go, for later.
         derive: the Jacobian at other parameters by a simulation nearer to the one that counts.
+        on_accept: called with parameters and cost after every chord step that is the best so far.
     """
     settings = problem.predictor.settings
     final = problem if not finer else replace(problem, predictor=problem.predictor.with_settings(settings.finer))
@@ -152,6 +154,8 @@ def close(
         at = Closing(final, trial, r, reach(jacobian, r))
         worse = best is not None and r @ r >= best.residuals @ best.residuals
         best = best if worse else at
+        if on_accept is not None and not worse:
+            on_accept(at.x, 0.5 * float(r @ r))
         if at.left > max(near, before.left / 3) or worse:
             if derive is None:
                 break

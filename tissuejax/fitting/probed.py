@@ -22,6 +22,7 @@ from tissuejax.experiments.probing_predictor import ProbingPredictor, make_ready
 from tissuejax.fitting.advice import warnings_of
 from tissuejax.fitting.closing import Told, changes, close
 from tissuejax.fitting.closing import shifts as numerical_shifts
+from tissuejax.fitting.levenberg_marquardt import Descent
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
@@ -103,20 +104,29 @@ def fit_probed(
         make_ready([runs.swift.predictor], [finest, fine], start, problem.free)
         y = problem.box.free(problem.vector(start))
         kept.before = kept.before or vector_errors(problem, runs.begin(y))
-        descent, _, J = sparing(
-            runs.jacobian, runs.residuals, y, max_steps=max_steps, fraction=fraction, last=LAST, on_accept=runs.accepted
-        )
+        if kept.closing:  # the swift descent had ended already
+            J = runs.better(problem.box.bounded(y)[0]) * problem.box.bounded(y)[1]
+            descent = Descent(y, 0.5 * float(runs.residuals(y) @ runs.residuals(y)), True, "converged", 0, [])
+        else:
+            descent, _, J = sparing(
+                runs.jacobian,
+                runs.residuals,
+                y,
+                max_steps=max_steps,
+                fraction=fraction,
+                last=LAST,
+                on_accept=runs.accepted,
+            )
         x, slope = problem.box.bounded(descent.y)
         J = J / slope
-        kept.keep(problem.values(x))
+        kept.keep(problem.values(x), closing=True)
         stage.advance(note="numerical error" if numerical else "the fine simulation")
         seen = changes(problem, problem.values(x), runs.told, finish, numerical)
         shifts, sizes = numerical_shifts(problem, seen.left, J)
         stage.advance(note="finer mesh" if finish else "last steps")
-        problem, x, r, left = close(problem, x, J, seen, runs.told, finish, holdout, runs.better)
+        problem, x, r, left = close(problem, x, J, seen, runs.told, finish, holdout, runs.better, runs.closer)
         cost = 0.5 * float(r @ r)
         final, values = problem.predictor, problem.values(x)
-        kept.keep(values)
         before, after = kept.before, vector_errors(problem, r)
         fitted = dict(runs.told.all([final], values)[0])
         stage.advance(note="held out")
@@ -207,8 +217,14 @@ class Runs:
 
     def accepted(self, n: int, cost: float, y: Float[np.ndarray, " p"]) -> None:
         """Keep an accepted step, show it and tell it."""
-        values = self.problem.values(self.problem.box.bounded(y)[0])
-        self.kept.keep(values)
+        self._told(n, cost, self.problem.values(self.problem.box.bounded(y)[0]), closing=False)
+
+    def closer(self, x: Float[np.ndarray, " p"], cost: float) -> None:
+        """The same for a chord step of the end."""
+        self._told(self.told.runs + self.jacobians, cost, self.problem.values(x), closing=True)
+
+    def _told(self, n: int, cost: float, values: dict[str, float], closing: bool) -> None:
+        self.kept.keep(values, closing)
         self.stage.advance(0, note=f"chi-square {2 * cost:.5g}")
         if self.on_accept is not None:
             self.on_accept(n, 2 * cost, values)
@@ -253,6 +269,7 @@ class Checkpoint:
     def __init__(self, path: Path | None, problem: Problem):
         self.path, self.problem = (None if path is None else Path(path)), problem
         self.before: dict[str, dict[str, float]] = {}  # errors at the very start
+        self.closing = False  # the swift descent had ended already
         parts = (problem.predictor.model, problem.predictor.names, problem.free, problem.predictor.settings)
         numbers = [problem.measured[k].tobytes() for k in problem.channels]
         self.mark = hashlib.sha256(repr(parts).encode() + b"".join(numbers)).hexdigest()
@@ -265,13 +282,14 @@ class Checkpoint:
         kept = json.loads(self.path.read_text())
         if kept.get("mark") != self.mark:
             return start
-        self.before = kept["before"]
+        self.before, self.closing = kept["before"], kept["closing"]
         return start | kept["values"]
 
-    def keep(self, values: Mapping[str, float]) -> None:
-        """Note accepted values."""
+    def keep(self, values: Mapping[str, float], closing: bool = False) -> None:
+        """Note accepted values, and whether the chord steps of the end have begun."""
         if self.path is not None:
-            storage.write_json(self.path, {"mark": self.mark, "values": dict(values), "before": self.before})
+            kept = {"mark": self.mark, "values": dict(values), "before": self.before, "closing": closing}
+            storage.write_json(self.path, kept)
 
     def done(self) -> None:
         """The fit has ended: nothing to resume."""

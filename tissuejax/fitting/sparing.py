@@ -93,6 +93,8 @@ def sparing(
             break
         if whole and errors < last and fraction >= 0.1:
             trace.append((cost, y))
+            if on_accept is not None:
+                on_accept(n, cost, y)
             return ended("converged")
     return ended(reason or f"no convergence after {n} runs")
 
