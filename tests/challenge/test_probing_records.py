@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from tissuejax.challenge import probing_cases
 from tissuejax.challenge.lobe import Lobe
 from tissuejax.challenge.material import Ingredient
 from tissuejax.challenge.probe_paths import Path, over
 from tissuejax.challenge.probing_bench import record
+from tissuejax.challenge.probing_menu import CATALOGUED
 from tissuejax.challenge.solid import Tissue
 
 LOBE = Lobe(0.03, 0.027, 0.09, 0.02, 0.5, 0.9, (0.0, 0.0))
@@ -54,3 +56,15 @@ def test_the_body_is_solved_for_again_where_it_feels_the_effect(told):
     assert len(solved) == 2
     assert lower.force[:, 2].max() > 1.1 * plain.force[:, 2].max()
     np.testing.assert_array_equal(lower.probe, plain.probe)
+
+
+def test_a_strong_challenge_has_every_effect_once_and_the_stronger_draws(rng):
+    kinds = [probing_cases.strong_category(i) for i in range(24)]
+    assert sorted(turn for kind, turn in kinds if kind == "one") == list(range(16))
+    assert sum(kind == "two" for kind, _ in kinds) == 8
+    for course in CATALOGUED:
+        weak, strong = (
+            np.median([course.strength(course.ingredient(rng, 600.0, draws).amount) for _ in range(200)])
+            for draws in (1, probing_cases.STRONG)
+        )
+        assert strong > weak, course.name

@@ -22,6 +22,7 @@ def make(
     seed: int = 1,
     jobs: int = 1,
     progress: Progress | None = None,
+    strong: bool = False,
 ) -> dict:
     """Make `count` cases and return the manifest.
 
@@ -34,25 +35,30 @@ def make(
         count: number of cases.
         seed: the same seed gives the same cases; another one, others.
         jobs: processes.
+        progress: told after every case.
+        strong: probings with strong effects only, one or two of them: how often is right what can be seen?
 
     Raises:
-        InputError: unknown kind, a count below one, or a folder that holds another challenge already.
+        InputError: unknown kind, strong material tests, a count below one, or a folder that holds another challenge
+            already.
     """
     out = Path(out)
     if kind not in KINDS:
         raise unknown("kind of challenge", kind, KINDS)
     if count < 1 or jobs < 1:
         raise InputError(f"count {count}, jobs {jobs}: both must be 1 or more")
-    plan = {"version": 1, "kind": kind, "count": count, "seed": seed}
+    if strong and kind != "probing":
+        raise InputError("strong cases are made of probings only; leave --strong out, or take --kind probing")
+    plan = {"version": 1, "kind": kind, "count": count, "seed": seed, "strong": strong}
     if (out / "manifest.json").exists():
-        manifest = files.read_manifest(out)
+        manifest = {"strong": False} | files.read_manifest(out)
         if {k: manifest[k] for k in plan} == plan:
             return manifest
         if {k: manifest[k] for k in plan if k != "count"} != {k: v for k, v in plan.items() if k != "count"}:
             raise InputError(f"{out} holds another challenge already; name an empty folder, or remove that one")
         if manifest["count"] > count:
             raise InputError(f"{out} holds {manifest['count']} cases of this seed already; ask for as many or more")
-    case = partial(_material, out, seed) if kind == "material" else partial(_probing, out, seed)
+    case = partial(_material, out, seed) if kind == "material" else partial(_probing, out, seed, strong)
     entries, keys = {}, {}
     with (progress or Silent()).stage(f"making {count} {kind} cases", total=count) as stage:
         for name, energy, key in _each(case, count, jobs):
@@ -83,14 +89,14 @@ def _material(out: Path, seed: int, index: int) -> tuple[str, str, dict]:
     return name, case.energy, case.key
 
 
-def _probing(out: Path, seed: int, index: int) -> tuple[str, str, dict]:
+def _probing(out: Path, seed: int, strong: bool, index: int) -> tuple[str, str, dict]:
     from tissuejax.challenge import probing_cases
 
     name = f"p{index:03d}"
     kept = out / "sealed" / "parts" / f"{name}.json"
     path = out / "cases" / f"{name}.h5"
     if not (kept.exists() and path.exists()):  # minutes each: what an interrupted run made is kept
-        case = probing_cases.draw(name, seed, index)
+        case = probing_cases.draw(name, seed, index, strong=strong)
         probing_cases.write(case, path)
         write_json(kept, {"energy": case.energy, "key": case.key})
     part = json.loads(kept.read_text())

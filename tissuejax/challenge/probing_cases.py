@@ -40,6 +40,15 @@ def category(index: int) -> str:
     return CATEGORIES[int(np.searchsorted(np.cumsum(SHARES), grid, side="right"))]
 
 
+STRONG = 3  # draws of which a strong case takes the strongest
+
+
+def strong_category(index: int) -> tuple[str, int]:
+    """Of a challenge of strong effects alone: two singles in turn, then a pair; category and turn."""
+    block, place = divmod(index, 3)
+    return ("one", 2 * block + place) if place < 2 else ("two", 5 * block)
+
+
 def courses(rng: np.random.Generator, kind: str, turn: int) -> list[Course]:
     """Effects of a case; single ones take their turn."""
     if kind == "none":
@@ -88,24 +97,28 @@ def draw(
     kind: str | None = None,
     turn: int | None = None,
     mesh: tuple[int, int, int] = MESH,
+    strong: bool = False,
 ) -> Probing:
     """The case with this seed and number (minutes of one core); redrawn if a body finds no equilibrium."""
+    if strong:
+        kind, turn = strong_category(index)
     with threadpool_limits(1):
         for attempt in range(6):
             rng = np.random.default_rng([seed, index, attempt, 2])
             try:
-                return _draw(name, rng, kind or category(index), index if turn is None else turn, mesh)
+                kind, turn = kind or category(index), index if turn is None else turn
+                return _draw(name, rng, kind, turn, mesh, STRONG if strong else 1)
             except NotConverged:
                 continue
     raise NotConverged(f"probing case {name}: no equilibrium in 6 draws; choose another seed")
 
 
-def _draw(name: str, rng: np.random.Generator, kind: str, turn: int, mesh: tuple[int, int, int]) -> Probing:
+def _draw(name: str, rng: np.random.Generator, kind: str, turn: int, mesh: tuple[int, int, int], draws: int) -> Probing:
     lobe = body(rng)
     C10 = float(np.exp(rng.uniform(np.log(400), np.log(1000))))
     tissue = Tissue(C10, C10 * float(rng.uniform(0.3, 1.1)), float(np.exp(rng.uniform(np.log(1.8e4), np.log(4.2e4)))))
     radius = float(rng.choice([0.0095, 0.0095, 0.0095, 0.00625]))
-    added = [c.ingredient(rng, C10) for c in courses(rng, kind, turn)]
+    added = [c.ingredient(rng, C10, draws) for c in courses(rng, kind, turn)]
     sites = [(x + rng.uniform(-1.5e-3, 1.5e-3), y + rng.uniform(-1.5e-3, 1.5e-3)) for x, y in rng.permutation(SITES)]
     styles = [str(s) for s in rng.permutation(["side", "twice", "once"])]
     if rng.random() < 0.3:

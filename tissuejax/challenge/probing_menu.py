@@ -28,16 +28,19 @@ class Course:
         draw: (rng, C10) to (amount, other numbers).
         history: the body has to be followed in time.
         solved: it changes the equilibrium; otherwise it is a matter of paths, clocks and sensors.
+        strength: of an amount; the larger, the further from a body without the effect.
     """
 
     name: str
     draw: Draw
     history: bool = False
     solved: bool = False
+    strength: Callable[[float], float] = abs
 
-    def ingredient(self, rng: np.random.Generator, C10: float) -> Ingredient:
-        """One drawn effect."""
-        amount, shape = self.draw(rng, C10)
+    def ingredient(self, rng: np.random.Generator, C10: float, draws: int = 1) -> Ingredient:
+        """One drawn effect: the strongest of some draws."""
+        drawn = [self.draw(rng, C10) for _ in range(draws)]
+        amount, shape = max(drawn, key=lambda one: self.strength(one[0]))
         return Ingredient(self.name, "", amount, shape)
 
 
@@ -66,6 +69,7 @@ CATALOGUED = (
             },
         ),
         solved=True,
+        strength=lambda factor: abs(np.log(factor)),
     ),
     Course(
         "contact-offset",
@@ -84,7 +88,12 @@ CATALOGUED = (
     Course("capsule", lambda r, c: (_log(r, 1, 15) * c * 1e-2, {}), solved=True),
     Course("adhesion", lambda r, c: (_log(r, 300, 3000), {"range": _log(r, 2e-4, 5e-4)}), history=True, solved=True),
     Course("machine-compliance", lambda r, c: (_log(r, 3e-4, 3e-3), {})),
-    Course("base-slip", lambda r, c: (_log(r, 0.15, 3.0) * c / 1e-2, {}), solved=True),
+    Course(
+        "base-slip",
+        lambda r, c: (_log(r, 0.15, 3.0) * c / 1e-2, {}),
+        solved=True,
+        strength=lambda stiffness: -stiffness,
+    ),
     Course("clock-lag", lambda r, c: (_log(r, 0.04, 0.25) * r.choice([-1.0, 1.0]), {})),
     Course("aging", lambda r, c: (_log(r, 0.03, 0.3) * r.choice([-1.0, 1.0]), {})),
     Course("anisotropy", lambda r, c: (_log(r, 0.5, 6) * c, {"along": [*_turn(r), 0.0]}), solved=True),

@@ -41,6 +41,11 @@ says what simpler ways of answering would have said on the same cases.
         )
         parser.add_argument("--count", type=int, default=200, metavar="N", help="make: number of cases (default 200)")
         parser.add_argument("--seed", type=int, default=1, help="make: the same seed gives the same cases (default 1)")
+        parser.add_argument(
+            "--strong",
+            action="store_true",
+            help="make: probings with one or two strong effects, no nulls, no strangers",
+        )
         parser.add_argument("--jobs", "-j", type=int, default=1, metavar="N", help="make, run: processes (default 1)")
         parser.add_argument("--case", action="append", default=[], metavar="NAME", help="run: only this case (repeat)")
         parser.add_argument("--again", action="store_true", help="run: diagnose again what has a result")
@@ -49,7 +54,7 @@ says what simpler ways of answering would have said on the same cases.
     def run(self, given: argparse.Namespace) -> Reply:
         """Do one of the four."""
         if given.action == "make":
-            made = make(given.folder, given.kind, given.count, given.seed, given.jobs, for_terminal())
+            made = make(given.folder, given.kind, given.count, given.seed, given.jobs, for_terminal(), given.strong)
             text = (
                 f"{len(made['cases'])} {given.kind} cases in {given.folder}\nkeys sealed, sha256 {made['keys_sha256']}"
             )
