@@ -31,8 +31,8 @@ VALUES = dict(C10=781.898, C20=-747.631, C30=426.135, C40=122.701)
 
 
 def cube(n: int, order: int, dtype, steps: int = 0):
-    """The gravity cube with n^3 hexes; 8 million element steps or more in 20 frames, and never so few steps that what is
-    worked out once a run counts."""
+    """The gravity cube with n^3 hexes; 8 million element steps or more in 20 frames, and so many steps that what is
+    worked out once a run does not count."""
     steps = steps or max(50, round(4e5 / n**3))
     values = {f"C{i}0": VALUES[f"C{i}0"] for i in range(1, order + 1)}
     scene = build.scene(
