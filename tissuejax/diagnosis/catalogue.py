@@ -33,7 +33,7 @@ from tissuejax.parameters import Parameter
 
 MOST = 24  # settings of one candidate's shapes at most
 ENERGY_FORM = EnergyForm(terms=("C30", "C01", "C02", "exponential", "ogden"))
-FIBRES = Anisotropy(families=2)
+FIBRES = Anisotropy(families=2, crimped=True)
 SPARE = {  # principal stretches cost as much as all the rest, a second family half as much again
     "energy-form": EnergyForm(terms=("C30", "C01", "C02", "exponential")),
     "anisotropy": Anisotropy(),
@@ -101,9 +101,12 @@ class Entry:
                 if name in form.each:
                     held += [f"{prefix}.{name}.{r}" for r in held_out]
                 for path in (*own, *(h for h in held if h.startswith(f"{prefix}.{name}."))):
-                    free[path] = limits(p, shape, form.grid.get(name, self.effect.grid.get(name, ())), form.reach)
+                    f = limits(p, shape, form.grid.get(name, self.effect.grid.get(name, ())), form.reach)
                     if name in form.most:
-                        free[path] = held_in(free[path], form.most[name])
+                        f = held_in(f, form.most[name])
+                    elif path in free:  # what one form may reach all may: which time is called the first means nothing
+                        f = replace(f, lower=min(f.lower, free[path].lower), upper=max(f.upper, free[path].upper))
+                    free[path] = f
                     start[path] = float(self.effect.neutral[name])
             candidates.append(
                 Candidate(
@@ -181,10 +184,12 @@ class Sizes:
 def entries(sizes: Sizes) -> list[Entry]:
     """All effects that act in material tests, in their forms."""
     pairs = {"tau1": (0.2, 0.6, 2.0), "tau2": (4.0, 12.0, 40.0)}
+    third = {"tau3": (1.0, 60.0, 0.1)}  # between the two that are there, slower, faster
     damage = {"m": tuple(sizes.energy * x for x in (0.02, 0.1, 0.4))}
     exponent = {"exponent": tuple(x / sizes.strain**2 for x in (0.3, 1.5))}
     steepest = {"exponent": 4 / sizes.strain**2}  # e^12 at the largest strain: I1bar - 3 is about 3 strain^2
-    fibres = 10 / math.expm1(2 * sizes.strain) ** 2  # e^10 at the largest stretch
+    stretched = math.expm1(2 * sizes.strain)  # the largest squared stretch less 1
+    fibres = 10 / stretched**2  # e^10 there
     special = {
         "viscoelasticity": (
             Viscoelasticity(terms=3),
@@ -192,11 +197,11 @@ def entries(sizes: Sizes) -> list[Entry]:
                 Form("one time", ("g1", "tau1"), {"tau1": TIMES}),
                 Form("two times", ("g1", "g2", "tau1", "tau2"), pairs),
                 Form("two times of the moduli", ("g1", "g2", "tau1", "tau2", "moduli"), {**pairs, "moduli": (1.0,)}),
-                Form("three times", ("g1", "g2", "g3", "tau1", "tau2", "tau3"), {}, nominated=False),
+                Form("three times", ("g1", "g2", "g3", "tau1", "tau2", "tau3"), third, nominated=False),
                 Form(
                     "three times of the moduli",
                     ("g1", "g2", "g3", "tau1", "tau2", "tau3", "moduli"),
-                    {"moduli": (1.0,)},
+                    {**third, "moduli": (1.0,)},
                     nominated=False,
                 ),
             ),
@@ -277,6 +282,20 @@ def entries(sizes: Sizes) -> list[Entry]:
                     "two families",
                     ("k1", "k2", "angle", "spread"),
                     {"spread": (0.4,)},
+                    nominated=False,
+                    most={"k2": fibres},
+                ),
+                Form(
+                    "crimped",
+                    ("k1", "k2", "angle", "onset"),
+                    {"onset": (0.2 * stretched, 0.5 * stretched)},
+                    nominated=False,
+                    most={"k2": fibres},
+                ),
+                Form(
+                    "crimped, two families",
+                    ("k1", "k2", "angle", "spread", "onset"),
+                    {"onset": (0.2 * stretched,), "spread": (0.4,)},
                     nominated=False,
                     most={"k2": fibres},
                 ),

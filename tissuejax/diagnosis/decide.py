@@ -7,7 +7,8 @@ Order of the questions, each with its own number:
    `GAIN` and a share `NEEDED` of the misfit, or take away a share `MOST` of what the smaller set leaves, or reach noise
    level where the smaller set doesn't, and the less it explains the more the held-out recordings have to agree.
 3. Does it explain? What is left must be noise, or at most a share `LEFT` of what was missing, in the fitted recordings
-   and in the held-out ones. Otherwise something is missing that the catalogue has no name for.
+   and in the held-out ones, and so little that names that leave as much were right more often than not (`trust`).
+   Otherwise something is missing that the catalogue has no name for.
 4. Could it be another? Sets of no more effects whose criterion is within `CLOSE` can't be told apart by these data.
 """
 
@@ -36,6 +37,9 @@ TEMPER = 4.0
 # nor those beside a larger set that the criterion prefers by hundreds and that was not believed; abstentions that
 # leave less than a third of it in the fitted recordings were mostly wrong (one of several effects not found).
 NAMED, HALF_NAMED, HALF_SLIGHTED = 0.97, 0.12, 300.0
+SLIGHTED = 0.05  # of what the chosen set has gained: what a larger one gains beyond is counted against that, too
+LAW = 0.005  # of the largest measurement: so much any law leaves of real data, and it speaks against no name
+EVEN = 0.5  # a name that is likelier wrong than right is not given
 STRANGE, HALF_STRANGE = 0.95, 0.3
 NOTHING = 0.95
 # The same of probings, of which few have been graded: no answer is stated as all but certain.
@@ -119,9 +123,25 @@ def worse(s: Search, r: Refit) -> bool:
     return after > WORSE * before and quality(s, r).z_held > SIGNIFICANT
 
 
+def sound(s: Search, r: Refit) -> bool:
+    """Whether r is beyond reproach: no worse than the base on held-out recordings, and no amplitude out of its range.
+
+    A friction as large as it may be is not measured, it has run away.
+    """
+    before, after = excess(s, s.empty)[1], excess(s, r)[1]
+    poorer = r.n_held > 0 and after > before + SIGNIFICANT * math.sqrt(2 * r.n_held) and quality(s, r).z_held > 0
+    free, amplitudes = s.bench.free, {p for k in r.keys for p in s.bench.candidates[k].amplitudes}
+    return not poorer and not any(r.values[p] >= free[p].upper for p in amplitudes.intersection(r.at_bound))
+
+
 def believed(s: Search) -> list[Refit]:
-    """The best form of every set that may be chosen."""
-    return [s.refits[k] for k in best_of_each(s) if not worse(s, s.refits[k])]
+    """The best form of every set that may be chosen; only sound ones where one of them removes most of the misfit."""
+    kept = [s.refits[k] for k in best_of_each(s) if not worse(s, s.refits[k])]
+    if s.bench.dear:
+        return kept
+    clean = [r for r in kept if sound(s, r)]
+    most = sum(excess(s, s.empty)) / 2
+    return clean if any(r.keys and sum(excess(s, r)) < most for r in clean) else kept
 
 
 def choose(s: Search) -> Refit:
@@ -164,9 +184,12 @@ def decide(s: Search) -> Verdict:
         twice = 2 * (LEFT if s.bench.dear else left)
         poor = not after.noise and total < 1 - left
         held = not after.noise and bool(s.bench.held_out) and explained[1] < 1 - twice and after.z_held > SIGNIFICANT
-        if poor or held:
+        doubtful = not s.bench.dear and trust(s, chosen, after.noise, e0, e1) < EVEN
+        if poor or held or doubtful:
             kind = "unexplained"
             reasons.append(f"the best set explains {total:.0%} of the misfit ({explained[1]:.0%} of the held-out one)")
+            if doubtful and not (poor or held):
+                reasons.append("names that leave as much were wrong more often than right")
         else:
             mine = s.names(frozenset(chosen.keys))
             rivals = tuple(
@@ -181,7 +204,7 @@ def decide(s: Search) -> Verdict:
     if s.bench.dear:
         sure = confidence(s, chosen) * SURE_DEAR[kind](after.noise, amplitude(e0, e1))
     else:
-        sure = stated(s, kind, chosen, after.noise, e0, e1)
+        sure = stated(s, kind, chosen, after.noise, e0, e1, rivals)
     return Verdict(kind, chosen, rivals, explained, tuple(reasons), before, after, sure)
 
 
@@ -193,23 +216,43 @@ def close(s: Search, chosen: Refit) -> float:
     return max(CLOSE, CLOSE_DEAR * (s.criterion(s.empty) - s.criterion(chosen))) if s.bench.dear else CLOSE
 
 
-def stated(s: Search, kind: str, chosen: Refit, noise: bool, before: tuple, after: tuple) -> float:
+def stated(s: Search, kind: str, chosen: Refit, noise: bool, before: tuple, after: tuple, rivals: tuple = ()) -> float:
     """Probability that the answer is right, of material tests.
 
-    A name loses with rivals near in criterion (`weight`), with company (`FEWER`), and where noise is not all that is
-    left with the amplitude a of the rest and the criterion c by which a larger set was better and not believed: by
-    1 / (1 + (a / a0)^3) and 1 / (1 + c / c0). An abstention loses the more, the less is left in the fitted recordings.
+    Of names their `trust`, by the weight of the chosen set (with its rivals, where these are offered too) among all
+    others. An abstention loses the more, the less is left in the fitted recordings.
     """
     if kind == "unexplained":
         left = max(amplitude(before[:1], after[:1]), 1e-9)
         return STRANGE / (1 + (HALF_STRANGE / left) ** 3)
     if kind == "nothing-missing":
         return NOTHING * weight(s, chosen)
-    sure = NAMED * FEWER[min(len(chosen.keys), 3)] * weight(s, chosen)
+    return trust(s, chosen, noise, before, after) * weight(s, chosen, rivals)
+
+
+def trust(s: Search, chosen: Refit, noise: bool, before: tuple, after: tuple) -> float:
+    """Probability that a set is right, were there no other: what it leaves speaks against it.
+
+    It loses with company (`FEWER`), and where noise is not all that is left with the amplitude a of the rest and the
+    criterion c by which a larger set was better and not believed: by 1 / (1 + (a / a0)^3) and 1 / (1 + c / c0). A rest
+    that is small against the largest measurement counts less (`LAW`).
+    """
+    sure = NAMED * FEWER[min(len(chosen.keys), 3)]
     if noise:
         return sure
-    slighted = s.criterion(chosen) - min(s.criterion(r) for r in believed(s))
-    return sure / (1 + (amplitude(before, after) / HALF_NAMED) ** 3) / (1 + max(slighted, 0.0) / HALF_SLIGHTED)
+    others = [s.criterion(r) for r in believed(s)]
+    slighted = max(s.criterion(chosen) - min(others, default=math.inf), 0.0)
+    allowed = max(HALF_SLIGHTED, SLIGHTED * (s.criterion(s.empty) - s.criterion(chosen)))
+    return (
+        sure / (1 + (amplitude(before, after) * large(s, chosen, after) / HALF_NAMED) ** 3) / (1 + slighted / allowed)
+    )
+
+
+def large(s: Search, chosen: Refit, after: tuple) -> float:
+    """Near 1 where a rest is large against what any law leaves (`LAW`), near 0 where it is small."""
+    noise = math.sqrt(float(np.mean(s.bench.sigma**2))) / max(float(np.max(np.abs(s.bench.y))), 1e-300)
+    rest = noise * math.sqrt(sum(after) / (chosen.n + chosen.n_held))
+    return rest / math.hypot(rest, LAW)
 
 
 def amplitude(before: tuple[float, ...], after: tuple[float, ...]) -> float:
@@ -217,11 +260,15 @@ def amplitude(before: tuple[float, ...], after: tuple[float, ...]) -> float:
     return math.sqrt(min(sum(after) / max(sum(before), 1e-9), 1.0))
 
 
-def weight(s: Search, chosen: Refit) -> float:
-    """Weight of the chosen set among all sets of no more effects by the criterion; tempered, laws being never ours."""
+def weight(s: Search, chosen: Refit, offered: tuple[Refit, ...] = ()) -> float:
+    """Weight of the chosen set, and of those offered beside it, among all sets of no more effects by the criterion.
+
+    Tempered, laws being never ours.
+    """
     rivals = [s.refits[k] for k in best_of_each(s) if len(k) <= max(len(chosen.keys), 1)]
     gaps = np.array([s.criterion(r) - s.criterion(chosen) for r in rivals]) / TEMPER
-    return float(1 / np.sum(np.exp(-np.clip(gaps, -50, 50))))
+    theirs = [math.exp(-min(max((s.criterion(r) - s.criterion(chosen)) / TEMPER, -50), 50)) for r in offered]
+    return float(min((1 + sum(theirs)) / np.sum(np.exp(-np.clip(gaps, -50, 50))), 1.0))
 
 
 def confidence(s: Search, chosen: Refit) -> float:

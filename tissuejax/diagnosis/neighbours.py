@@ -41,13 +41,13 @@ def neighbours(s, parent: Refit) -> list[frozenset]:
                 s.report(" + ".join(order))
                 starts = [{**parent.values, **setting} for setting in s.bench.candidates[new].grid]
                 if len(at) == 1 or s.bench.dear:
-                    s.refits[key] = s.finished(order, starts[: s.budget.starts])
+                    s.refits[key] = s.finished(order, starts[: s.budget.starts + (not s.bench.dear)])
                     known.append(key)
                 else:
                     begun.append(s.begun(order, starts[: s.budget.starts], held=True))
     for rank, r in enumerate(sorted(begun, key=s.criterion)):
         key = frozenset(r.keys)
-        if rank < FINISHED and s.criterion(r) < s.criterion(parent) + PROMISING:
+        if s.criterion(r) < s.criterion(parent) + PROMISING and (rank < FINISHED or s.patient):
             s.refits[key] = s.finished(r.keys, [r.values])
             known.append(key)
         else:

@@ -17,6 +17,9 @@ from tissuejax.diagnosis.misfit import Misfit
 
 HOPELESS = 5e-4  # of what exceeds noise: a fit that leaves much is not polished
 NOTHING = 1e-5  # of the largest effect of a parameter, each moved by its scale: what a one-sided difference errs by
+FREE = (
+    1e-4  # damping below which a true Jacobian's step is as long as the data allow: one that gains nothing is the end
+)
 ENOUGH = 2e-3  # of chi-square: where a prediction is a simulation, a step that promises less is not taken
 
 
@@ -116,14 +119,16 @@ class Descent:
     ) -> tuple[np.ndarray, float, np.ndarray, bool]:
         """From x to (x, cost, prediction, converged).
 
-        A Jacobian costs many predictions, so it is only corrected along steps that keep their promise (Broyden).
+        A Jacobian costs many predictions, so it is only corrected along steps that keep their promise (Broyden); but a
+        corrected one knows nothing of directions that were not taken, nor that of the start of shapes whose amplitude
+        was zero there: neither may end the descent.
 
         Args:
             jac: the Jacobian at x (as `jacobian` gives it) where it is known already.
         """
         cost, r, prediction = self.objective(x)
         # a Jacobian from elsewhere may lack what vanishes there (shapes at zero amplitude): good for one step
-        damping, small, age, given = 1e-3, 0, 0, jac is not None
+        damping, small, age, given, first = 1e-3, 0, 0, jac is not None, True
         dear = self.bench.dear
         for _ in range(iterations):
             if not np.isfinite(cost):
@@ -137,6 +142,8 @@ class Descent:
             # A column that is nothing but the error of a difference (a fibre along an axis: no slope in its angle) must
             # not call for a step of its own, or nothing else moves.
             nothing = size * self.scale < NOTHING * np.max(size * self.scale, initial=0.0)
+            lacking = given or (first and not dear and not np.all(size))
+            first = False
             q, t = np.linalg.qr(np.where(nothing, 0.0, jac))
             right = q.T @ r
             size = np.maximum(size, 1e-9 * np.max(size, initial=0.0) + 1e-6 / self.scale)
@@ -161,20 +168,25 @@ class Descent:
                 jac = None
                 continue
             drop = cost - new
-            if drop > 0.7 * promised and age < 3 and step @ step > 0 and not given:
+            true = (age == 0 and not lacking) or dear
+            if drop > 0.7 * promised and age < 3 and step @ step > 0 and not lacking:
                 jac, age = jac + np.outer(left - r_new, step) / (step @ step), age + 1
             else:
                 jac, given = None, False
             cost, x, r, prediction = new, trial, r_new, p_new
             damping = max(damping / 10, 1e-9)
-            small = small + 1 if drop < max(tolerance, HOPELESS * (cost - len(r))) else 0
-            if small >= 2 or drop < 1e-3 * tolerance:
+            tiny = drop < max(tolerance, HOPELESS * (cost - len(r)))
+            if tiny and not true:  # a corrected Jacobian, or one without the column of a shape, tells of no end
+                jac, given = None, False
+                continue
+            small = small + 1 if tiny else 0
+            if small >= 2 or drop < 1e-3 * tolerance or (tiny and not dear and damping < FREE):
                 return x, cost, prediction, True
         return x, cost, prediction, False
 
     def errors(self, x: np.ndarray, r: np.ndarray) -> tuple[dict[str, float], tuple[str, ...]]:
         """Standard errors in natural coordinates (scaled up by an honest misfit), and the paths on a bound."""
-        span = np.where(np.isfinite(self.high - self.low), self.high - self.low, 1.0)
+        span = np.minimum(np.where(np.isfinite(self.high - self.low), self.high - self.low, 1.0), self.scale)
         at = (x - self.low < 1e-6 * span) | (self.high - x < 1e-6 * span)
         std = np.full(len(x), np.nan)
         jac = self.last if self.bench.dear and self.last is not None else self.jacobian(x)

@@ -43,6 +43,8 @@ class Budget:
         tolerance: of a refit, in units of chi-square.
         finished: nominees refitted to the end at each size; the rest are dropped after a few steps.
         promise: share of the excess that the best pair must explain for a third effect to be sought.
+        patience: cost up to which nominees beyond `finished` are refitted to the end too, by size, as long as none
+            leaves noise only: a few steps say little of a set whose shapes have far to go.
         spend: cost of all predictions so far, in those of the base model, after which nothing more is tried at a size
             (`Bench.spent`); the last for leaving effects out in the end. 6e4 are about a minute of one processor.
         burden: searches and memories nested in a prediction at most (`Bench.burden`): three take a second a prediction.
@@ -57,6 +59,7 @@ class Budget:
     tolerance: float = 0.1
     finished: tuple[int, ...] = (6, 4, 3)
     promise: float = 0.6
+    patience: tuple[float, ...] = (5e3, 1.5e4, 2.5e4)
     spend: tuple[float, ...] = (3e4, 3e4, 5e4, 6e4)
     burden: int = 2
 
@@ -103,6 +106,12 @@ class Search:
         """Whether what the search may spend is spent."""
         spend = self.budget.spend
         return not self.bench.dear and self.bench.spent > spend[min(self.size, len(spend) - 1)]
+
+    @property
+    def patient(self) -> bool:
+        """Whether sets that a few steps don't put first are refitted to the end too; see `Budget.patience`."""
+        patience = self.budget.patience[min(self.size, len(self.budget.patience) - 1)]
+        return not self.bench.dear and self.bench.spent < patience and not quality(self, self.best).noise
 
     @property
     def best(self) -> Refit:
@@ -188,7 +197,7 @@ class Search:
         """Refits of sets with one candidate more, from its most promising settings; remembered.
 
         All are given a few steps, and the `most` of smallest criterion in the fitted recordings are finished, as
-        long as there is something to spend.
+        long as there is something to spend; the others too where none of them explains and little has been spent.
         """
         grown, begun = [], {}
         for keys, score in extensions:
@@ -211,8 +220,10 @@ class Search:
                 grown.append(key)
             else:
                 begun.setdefault(key, self.begun(order, starts))
-        for key, r in sorted(begun.items(), key=lambda kr: self.fitted(kr[1]))[:most]:
+        for rank, (key, r) in enumerate(sorted(begun.items(), key=lambda kr: self.fitted(kr[1]))):
             if len(grown) >= LEAST and self.exhausted:
+                break
+            if rank >= most and not self.patient:
                 break
             self.refits[key] = self.finished(r.keys, [r.values])
             grown.append(key)
@@ -232,13 +243,10 @@ class Search:
         # the fitted recordings explained and the held-out ones not: the former may allow other values as well
         if self.bench.dear or found.chi2 > ALLOWED * found.n or found.held <= ALLOWED * found.n_held:
             return found
-        for other in self.bench.elsewhere(found.values):
-            if self.exhausted:
-                break
-            again = self.refit(keys, {**found.values, **other}, **options)
-            found = min(found, again, key=self.criterion)
-            if found.held <= ALLOWED * found.n_held:
-                break
+        others = [{**found.values, **other} for other in self.bench.elsewhere(found.values)]
+        if others and not self.exhausted:
+            again = min((self.begun(keys, [other], held=True) for other in others), key=self.criterion)
+            found = min(found, self.refit(keys, again.values, **options), key=self.criterion)
         return found
 
     def again(self, keys: frozenset) -> Refit:

@@ -19,10 +19,11 @@ class Anisotropy(Effect):
     Direction in the sample's frame: `angle` from x towards y, `elevation` from that plane towards z. Shortened fibres
     carry the share `compression` of what they would (0: tension only, the usual assumption; not fitted unless named).
     With two `families` half of them lie at angle + `spread`, half at angle - `spread`: psi is the mean of the two.
+    `crimped` fibres bear nothing until they are straight: E = I4bar - 1 - `onset` then, where that is positive.
 
     Revealed by different stiffness of specimens cut, or stretched, along different directions. Blind: recordings in one
     direction, or without a `direction`, unless biaxial.
-    Source: Holzapfel, Gasser and Ogden 2000, J. Elasticity 61, eq. 65.
+    Source: Holzapfel, Gasser and Ogden 2000, J. Elasticity 61, eq. 65; crimp: Lanir 1983, J. Biomech. 16, 1-12.
     """
 
     name: ClassVar[str] = "anisotropy"
@@ -39,18 +40,22 @@ class Anisotropy(Effect):
     }
 
     families: int = 1
+    crimped: bool = False
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         spread = Parameter(
             "spread", "rad", 0.0, 0.0, np.pi / 2, "half the angle of two families", scale=0.3, frozen=True
         )
+        meaning = "squared stretch less 1 from which crimped fibres bear load"
+        onset = Parameter("onset", "1", 0.0, 0.0, 2.0, meaning, scale=0.05, frozen=True)
         return (
             Parameter("k1", "Pa", 0.0, lower=0.0, scale=100.0, meaning="stiffness of the fibres"),
             Parameter("k2", "1", 1.0, lower=1e-3, upper=1e3, meaning="stiffening of the fibres"),
             Parameter("angle", "rad", 0.0, lower=-7.0, upper=7.0, scale=0.3, meaning="of the fibres, from x to y"),
             Parameter("elevation", "rad", 0.0, lower=-7.0, upper=7.0, scale=0.3, meaning="of the fibres, towards z"),
             *([spread] if self.families == 2 else []),
+            *([onset] if self.crimped else []),
             Parameter("compression", "1", 0.0, lower=0.0, upper=1.0, frozen=True, meaning="share when shortened"),
         )
 
@@ -65,6 +70,6 @@ class Anisotropy(Effect):
         C, level = strain.C, jnp.cos(p["elevation"])
         x, y, z = level * jnp.cos(angle), level * jnp.sin(angle), jnp.sin(p["elevation"])
         along = x * x * C.xx + y * y * C.yy + z * z * C.zz + 2 * (x * y * C.xy + x * z * C.xz + y * z * C.yz)
-        E = strain.J ** (-2 / 3) * along - 1
+        E = strain.J ** (-2 / 3) * along - 1 - p.get("onset", 0.0)
         squared = jnp.where(E > 0, E * E, p["compression"] * E * E)
         return 0.5 * p["k1"] / p["k2"] * expm1(p["k2"] * squared)
