@@ -26,6 +26,7 @@ from tissuejax.diagnosis.score import Score, scores
 from tissuejax.errors import NotConverged
 
 LEAST = 2  # sets finished at each size, whatever they cost
+ELSEWHERE = 2  # other places to start from that are followed to the end
 ALLOWED = 1.5  # chi-square per sample up to which a fit explains its recordings
 
 
@@ -244,9 +245,10 @@ class Search:
         if self.bench.dear or found.chi2 > ALLOWED * found.n or found.held <= ALLOWED * found.n_held:
             return found
         others = [{**found.values, **other} for other in self.bench.elsewhere(found.values)]
-        if others and not self.exhausted:
-            again = min((self.begun(keys, [other], held=True) for other in others), key=self.criterion)
-            found = min(found, self.refit(keys, again.values, **options), key=self.criterion)
+        begun = [] if self.exhausted else [self.begun(keys, [other], held=True) for other in others]
+        for again in sorted(begun, key=self.criterion)[:ELSEWHERE]:
+            if found.held > ALLOWED * found.n_held:
+                found = min(found, self.refit(keys, again.values, **options), key=self.criterion)
         return found
 
     def again(self, keys: frozenset) -> Refit:
