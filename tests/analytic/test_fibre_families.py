@@ -38,3 +38,14 @@ def test_families_alike_about_the_loaded_axis_by_hand():
     E = np.cos(0.6) ** 2 * 1.69 + np.sin(0.6) ** 2 / 1.3 - 1
     expected = 200.0 / 4.0 * (np.exp(2 * E**2) - 1)
     assert float(Anisotropy(families=2).energy(p, strain(1.3, 1.3**-0.5))) == pytest.approx(expected, rel=1e-6)
+
+
+def test_crimped_fibres_bear_nothing_until_they_are_straight():
+    """Stretch 1.3 along the fibres: E = 1.69 - 1 - 0.25; at 1.1 (0.21 < 0.25) nothing; without crimp as before."""
+    fibres = Anisotropy(crimped=True)
+    p = {"k1": 200.0, "k2": 2.0, "angle": 0.0, "elevation": 0.0, "compression": 0.0, "onset": 0.25}
+    expected = 200.0 / 4.0 * (np.exp(2 * 0.44**2) - 1)
+    assert float(fibres.energy(p, strain(1.3, 1.3**-0.5))) == pytest.approx(expected, rel=1e-6)
+    assert float(fibres.energy(p, strain(1.1, 1.1**-0.5))) == 0.0
+    here = strain(1.2, 0.95, 0.1)
+    assert float(fibres.energy(FIBRES | {"onset": 0.0}, here)) == float(Anisotropy().energy(FIBRES, here))
