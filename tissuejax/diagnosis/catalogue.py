@@ -6,6 +6,7 @@ richer and its poorer neighbour, so that a law that differs from ours bends the 
 effect is called to help.
 """
 
+import functools
 import itertools
 import math
 from collections.abc import Mapping
@@ -104,8 +105,8 @@ class Entry:
                     f = limits(p, shape, form.grid.get(name, self.effect.grid.get(name, ())), form.reach)
                     if name in form.most:
                         f = held_in(f, form.most[name])
-                    elif path in free:  # what one form may reach all may: which time is called the first means nothing
-                        f = replace(f, lower=min(f.lower, free[path].lower), upper=max(f.upper, free[path].upper))
+                    elif path in free:  # what one form may reach all may
+                        f = wider(f, free[path])
                     free[path] = f
                     start[path] = float(self.effect.neutral[name])
             candidates.append(
@@ -119,6 +120,9 @@ class Entry:
                     nominated=form.nominated,
                 )
             )
+        times = [p for p in free if p.startswith(f"{prefix}.tau") and p[-1].isdigit()]
+        for path in times:  # which time is called the first means nothing
+            free[path] = functools.reduce(wider, (free[p] for p in times), free[path])
         for i, c in enumerate(candidates):
             beside = [candidates[j].key for j in range(len(candidates)) if self.near(i, j)]
             candidates[i] = replace(c, beside=tuple(beside))
@@ -149,6 +153,11 @@ def limits(p: Parameter, shape: bool, grid: tuple[float, ...], reach: float = 10
         known = [v for v in (*grid, p.default) if v > 0]
         lower, upper = max(lower, min(known) / reach), min(upper, max(known) * reach)
     return Free(lower, upper, p.typical, p.unit, log=log)
+
+
+def wider(f: Free, other: Free) -> Free:
+    """`f` with a range that holds that of the other too."""
+    return replace(f, lower=min(f.lower, other.lower), upper=max(f.upper, other.upper))
 
 
 def held_in(f: Free, most: float) -> Free:
