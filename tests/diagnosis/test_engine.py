@@ -1,10 +1,12 @@
 """The engine on a spring in closed form: what it must find, and what it must leave unsaid."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from spring_bench import spring
 
-from tissuejax.diagnosis.decide import decide, stated
+from tissuejax.diagnosis.decide import decide, sound, stated
 from tissuejax.diagnosis.locate import locate
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.refit import refit
@@ -127,3 +129,27 @@ def test_a_period_is_located():
     bench = spring({"wave.s": 0.3, "wave.period": 2.3})
     period = next(x for x in locate(bench, bench.predict({"a": 10.0, "b": 20.0})) if x.kind == "period")
     assert period.details["period"] == pytest.approx(2.3, rel=0.05)
+
+
+def test_no_name_is_given_that_leaves_as_much_as_wrong_ones_do():
+    """Relaxation beside a wobble that no candidate knows, larger than a hundredth of the peak."""
+    kinds = []
+    for size in (0.0, 0.06):
+        bench = spring({"relax.g": 0.4, "relax.tau": 1.0}, sigma=0.02)
+        for s in bench.segments:
+            bench.y[s.rows] += size * np.sin(s.time**1.5)
+        verdict = decide(search(bench))
+        assert names(verdict) == ("relax",)
+        kinds.append(verdict.kind)
+        assert verdict.kind != "found" or verdict.confidence > 0.5
+    assert kinds == ["found", "unexplained"]
+
+
+def test_a_set_that_ran_to_its_bound_or_predicts_worse_than_the_base_is_not_sound():
+    s = search(spring({"relax.g": 0.2, "relax.tau": 0.6}))
+    good = s.refits[frozenset({"relax"})]
+    assert sound(s, good)
+    assert not sound(s, replace(good, at_bound=("relax.g",), values={**good.values, "relax.g": 0.95}))
+    off = replace(good, at_bound=("relax.g",), values={**good.values, "relax.g": 0.0})
+    assert sound(s, off)
+    assert not sound(s, replace(good, held=2 * s.empty.held))
