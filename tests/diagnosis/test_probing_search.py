@@ -76,3 +76,37 @@ def test_a_set_that_can_do_without_an_effect_is_finished_and_one_that_cannot_is_
         frozenset("a"): 12.0,
         frozenset("b"): 60.0,
     }
+
+
+@pytest.mark.parametrize(("held", "led_by"), [(10.0, "a"), (40.0, "a"), (60.0, "b"), (80.0, "b")])
+def test_what_no_set_explains_of_the_held_out_recording_does_not_choose_among_them(held, led_by):
+    """b is better on the fitted recordings; a by the criterion, which counts the held-out one (100 before) as well."""
+    refits = {frozenset(): Fit((), 0.0, 100.0, chi2=100.0)}
+    refits |= {frozenset("a"): Fit(("a",), 0.0, held, chi2=25.0), frozenset("b"): Fit(("b",), 0.0, 90.0, chi2=20.0)}
+    s = SimpleNamespace(refits=refits, criterion=lambda r: r.chi2 + r.held, fitted=lambda r: r.chi2)
+    assert probing_search.leading(s, frozenset(), [frozenset("a"), frozenset("b")]) == frozenset(led_by)
+
+
+class Outside:
+    """Two recordings fitted, one not: its ten samples are all 3 too high, and an offset of its own would say so."""
+
+    held_out, start = ("r3",), {"own": 0.0, "other": 0.0}
+    free = {p: SimpleNamespace(lower=-10.0, upper=10.0, prior=None) for p in ("own", "other")}
+    candidates = {
+        "offset/each": SimpleNamespace(held=("own",), shapes=(), name="offset"),
+        "wave": SimpleNamespace(held=("other",), shapes=(), name="wave"),
+        "common": SimpleNamespace(held=(), shapes=(), name="common"),
+    }
+
+    def jacobian(self, values, paths, names):
+        columns = {"own": np.ones(10), "other": np.tile([1.0, -1.0], 5)}
+        return np.stack([columns[p] for p in paths], axis=1)
+
+
+@pytest.mark.parametrize(("chi2", "asked"), [(10.0, ["offset/each"]), (40.0, [])])
+def test_held_out_recordings_that_are_missed_far_more_ask_for_values_of_their_own(chi2, asked):
+    parent = Fit((), 0.0, 90.0, chi2=chi2, n=10, n_held=10)
+    parent.prediction, parent.values = np.zeros(10), {}
+    misfit = SimpleNamespace(residual=lambda prediction, names: np.full(10, 3.0), whiten=lambda x, names: x)
+    s = SimpleNamespace(refits={frozenset(): parent}, bench=Outside(), misfit=misfit, names=lambda keys: frozenset())
+    assert probing_search.asked_outside(s, frozenset()) == asked

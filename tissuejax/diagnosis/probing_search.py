@@ -19,7 +19,7 @@ from tissuejax.diagnosis.probing_numerics import numerics
 from tissuejax.diagnosis.probing_runs import COARSE, FINE
 from tissuejax.diagnosis.quality import quality, veiled
 from tissuejax.diagnosis.refit import Refit, refit
-from tissuejax.diagnosis.score import Score
+from tissuejax.diagnosis.score import Score, gain, trusted
 from tissuejax.diagnosis.search import ALLOWED, Budget, Search
 from tissuejax.errors import NotConverged
 
@@ -31,6 +31,10 @@ SETTLED, NEARLY = 0.03, 1.3  # share of the base's excess, and chi-square per sa
 CLOSE = 0.85  # the same, once one refit leaves nothing but noise
 BRIEF, LACKING = 3, 0.25  # iterations without one effect, and the share of what was missing that makes it needed
 ELSEWHERE = 0.5  # of the best place's gain: the least for an inclusion to be tried under another site
+OUTSIDE = 3.0  # times the misfit of the fitted recordings: from there on the held-out ones are asked what they lack
+MOSTLY = (
+    0.5  # share of the held-out misfit that their own values must take up, and that a set must explain to be led by
+)
 
 
 def search_probing(bench: ProbingBench, budget: Budget, report: Callable[[str], None] = lambda _: None) -> Search:
@@ -66,8 +70,7 @@ def search_probing(bench: ProbingBench, budget: Budget, report: Callable[[str], 
         grown = grow(s, at, budget.nominees[min(size, len(budget.nominees) - 1)])
         if not grown:
             break
-        best = min(grown, key=lambda k: s.criterion(s.refits[k]))
-        best = richer(s, best)
+        best = richer(s, leading(s, at, grown))
         if s.criterion(s.refits[best]) >= s.criterion(parent):
             break
         if len(best) > 1:
@@ -87,6 +90,38 @@ def settled(s: Search, r: Refit) -> bool:
     return left < SETTLED * whole and r.chi2 / r.n < NEARLY
 
 
+def leading(s: Search, at: frozenset, grown: list[frozenset]) -> frozenset:
+    """The set to go on with: the smallest criterion, or the best on the fitted recordings where none explains the rest.
+
+    What a second effect does to the held-out recordings must not choose the first.
+    """
+    parent, best = s.refits[at], min(grown, key=lambda k: s.criterion(s.refits[k]))
+    lost = parent.held - parent.n_held
+    if s.refits[best].held - parent.n_held < (1 - MOSTLY) * lost or lost < parent.n_held:
+        return best
+    return min(grown, key=lambda k: s.fitted(s.refits[k]))
+
+
+def asked_outside(s: Search, at: frozenset) -> list[str]:
+    """Candidates whose own values the held-out recordings ask for, what explains most first.
+
+    Two probes set alike too low pass for a softer body, and only a third, set otherwise, shows it.
+    """
+    parent, bench, names = s.refits[at], s.bench, s.bench.held_out
+    if not names or parent.held / parent.n_held < OUTSIDE * max(parent.chi2 / parent.n, 1.0):
+        return []
+    r, found = s.misfit.residual(parent.prediction, names), []
+    for key, c in bench.candidates.items():
+        if not c.held or c.shapes or c.name in s.names(at):
+            continue
+        columns = s.misfit.whiten(bench.jacobian(parent.values, c.held, names), names)
+        low, high = np.array([trusted(bench.free[p]) for p in c.held]).T - [bench.start[p] for p in c.held]
+        taken, _ = gain(r, columns, np.minimum(low, 0.0), np.maximum(high, 0.0))
+        if taken > MOSTLY * (parent.held - parent.n_held):
+            found.append((taken, key))
+    return [key for _, key in sorted(found, reverse=True)]
+
+
 def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
     """The set with one effect more, for the few effects that explain most; refitted."""
     parent, trials = s.refits[at], []
@@ -98,13 +133,18 @@ def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
     trials.sort(key=lambda t: t[0])
     whole = parent.chi2
     grown: list[frozenset] = []
+    for key in asked_outside(s, at):
+        s.report(f"{' + '.join([*parent.keys, key])}, which the held-out recordings ask for")
+        s.refits[at | {key}] = finish(s, (*parent.keys, key), parent)
+        grown.append(at | {key})
+    most += len(grown)
     for chi2, key, trial, score in trials:
-        if len(grown) == most:
+        own = any(s.bench.candidates[c].held for k in grown for c in k - at)
+        if len(grown) >= most + own:  # they mimic much that is common to all: one rival more is heard
             break
         if s.names(at | {key}) in [s.names(k) for k in grown]:
             continue  # forms of one effect are compared in `richer`
         calm = [k for k in grown if quality(s, s.refits[k]).noise or settled(s, s.refits[k])]
-        # values of its own in every recording mimic much that is common to all: those rivals have to be heard
         enough = any(not s.bench.candidates[c].held for k in calm for c in k - at)
         if whole - chi2 < (CLOSE if enough else RIVALS) * (whole - trials[0][0]):
             break
