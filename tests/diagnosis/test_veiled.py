@@ -3,7 +3,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-from tissuejax.diagnosis.decide import SEEN_DEAR, SURE_DEAR, needed
+from tissuejax.diagnosis.decide import SEEN_DEAR, SURE_DEAR, needed, too_little
 from tissuejax.diagnosis.quality import CHANNEL, TOLERATED_HELD, VEILED, Quality, veiled
 
 
@@ -53,3 +53,14 @@ def fits_of(gained: float, n: int = 10_000):
 def test_an_effect_that_gains_less_than_laws_and_meshes_differ_by_is_not_needed():
     assert not needed(*fits_of(0.5 * SEEN_DEAR * 20_000))
     assert needed(*fits_of(1.5 * SEEN_DEAR * 20_000))
+
+
+def test_a_set_that_leaves_half_of_a_weak_misfit_is_not_what_was_missing_though_noise_is_all_that_is_left():
+    noise = Quality(fitted=1.1, held=1.05, z_fitted=5.0, z_held=2.0, z_correlation=9.0, dear=True, channel=1.1)
+    chosen = SimpleNamespace(own={}, n=10_000, n_held=5_000)
+    s = SimpleNamespace(bench=SimpleNamespace(dear=True, held_out=("r3",)))
+    assert noise.noise
+    assert too_little(s, chosen, noise, (2000.0, 500.0), (1100.0, 300.0))
+    assert not too_little(s, chosen, noise, (2000.0, 500.0), (400.0, 100.0))
+    s.bench.dear = False
+    assert not too_little(s, chosen, noise, (2000.0, 500.0), (1100.0, 300.0)), "of material tests noise is known"

@@ -30,6 +30,7 @@ WORSE = 1.5
 LEFT = 0.15
 LEFT_SEEN = 0.06  # the same where what is left exceeds the noise itself: a quarter of the size
 LEFT_DEAR, CLOSE_DEAR, SEEN_DEAR = 0.08, 0.01, 0.05  # where a prediction is a simulation
+HALF_DEAR = 0.4  # share that may be left at most there, however near to noise: true effects left a sixth or less
 TEMPER = 4.0
 # How often an answer should be right: round numbers from development cases of material tests, after the opened seed
 # 88213 had shown that the former ones were too sure. Names that leave noise were right in nearly all, names that leave
@@ -177,18 +178,13 @@ def decide(s: Search) -> Verdict:
             else "the residual is not noise, and no effect of the catalogue explains it"
         )
     else:
-        # what a held-out recording has for itself was fitted to it, and explains it too easily
-        total = explained[0] if chosen.own else 1 - sum(e1) / max(sum(e0), 1e-9)
-        seen = sum(e1) > chosen.n + chosen.n_held
-        left = LEFT_DEAR if s.bench.dear else LEFT_SEEN if seen else LEFT
-        twice = 2 * (LEFT if s.bench.dear else left)
-        poor = not after.noise and total < 1 - left
-        held = not after.noise and bool(s.bench.held_out) and explained[1] < 1 - twice and after.z_held > SIGNIFICANT
+        total = part(chosen, e0, e1)
+        short = too_little(s, chosen, after, e0, e1)
         doubtful = not s.bench.dear and trust(s, chosen, after.noise, e0, e1) < EVEN
-        if poor or held or doubtful:
+        if short or doubtful:
             kind = "unexplained"
             reasons.append(f"the best set explains {total:.0%} of the misfit ({explained[1]:.0%} of the held-out one)")
-            if doubtful and not (poor or held):
+            if doubtful and not short:
                 reasons.append("names that leave as much were wrong more often than right")
         else:
             mine = s.names(frozenset(chosen.keys))
@@ -206,6 +202,30 @@ def decide(s: Search) -> Verdict:
     else:
         sure = stated(s, kind, chosen, after.noise, e0, e1, rivals)
     return Verdict(kind, chosen, rivals, explained, tuple(reasons), before, after, sure)
+
+
+def part(chosen: Refit, before: tuple, after: tuple) -> float:
+    """Share of what was missing that the chosen set explains.
+
+    What a held-out recording has for itself was fitted to it, and explains it too easily: that does not count.
+    """
+    if chosen.own:
+        return 1 - after[0] / before[0] if before[0] > 0 else 1.0
+    return 1 - sum(after) / max(sum(before), 1e-9)
+
+
+def too_little(s: Search, chosen: Refit, after: Quality, e0: tuple, e1: tuple) -> bool:
+    """Whether the chosen set leaves more than a set may leave that is what was missing, all in all or held out."""
+    if after.noise:
+        return s.bench.dear and sum(e1) > HALF_DEAR * sum(e0)
+    total = part(chosen, e0, e1)
+    seen = sum(e1) > chosen.n + chosen.n_held
+    left = LEFT_DEAR if s.bench.dear else LEFT_SEEN if seen else LEFT
+    if total < 1 - left:
+        return True
+    twice = 2 * (LEFT if s.bench.dear else left)
+    outside = 1 - e1[1] / e0[1] if e0[1] > 0 else 1.0
+    return bool(s.bench.held_out) and outside < 1 - twice and after.z_held > SIGNIFICANT
 
 
 def close(s: Search, chosen: Refit) -> float:
