@@ -124,8 +124,8 @@ def asked_outside(s: Search, at: frozenset) -> list[str]:
 
 def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
     """The set with one effect more, for the few effects that explain most; refitted."""
-    parent, trials = s.refits[at], []
-    for score in nominees(s, at):
+    parent, trials, nominated = s.refits[at], [], nominees(s, at)
+    for score in nominated:
         s.report(f"one step: {' + '.join([*parent.keys, score.key])}")
         trial = step(s, parent, score)
         if math.isfinite(trial.chi2):
@@ -153,7 +153,24 @@ def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
         done = s.refits[keys] = under_another_site(s, parent, score, finish(s, trial.keys, trial))
         s.report(f"{' + '.join(trial.keys)}: chi-square {done.chi2 / done.n:.3g}")
         grown.append(keys)
-    return grown
+    return grown + favourite(s, at, nominated[:1], grown)
+
+
+def favourite(s: Search, at: frozenset, first: list[Score], grown: list[frozenset]) -> list[frozenset]:
+    """The set with the candidate of the best score, if its one step led too far (a support nearly free, say), and
+    nothing else explains the rest: refitted from the parent, in steps as long as the simulation bears them."""
+    parent = s.refits[at]
+    if any(quality(s, s.refits[k]).noise or settled(s, s.refits[k]) for k in grown):
+        return []
+    found = []
+    for score in first:
+        keys = at | {score.key}
+        if s.names(keys) not in [s.names(k) for k in grown]:
+            s.report(f"{' + '.join([*parent.keys, score.key])}, in shorter steps")
+            start = replace(parent, values={**parent.values, **score.setting})
+            s.refits[keys] = finish(s, (*parent.keys, score.key), start)
+            found.append(keys)
+    return found
 
 
 def nominees(s: Search, at: frozenset) -> list[Score]:
