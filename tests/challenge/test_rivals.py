@@ -51,6 +51,11 @@ def test_each_criterion_names_its_own_favourite():
     assert rivals.by_all_subsets(RESULT) == (("slack", "drift"), 1.1)
 
 
+def test_a_set_whose_refit_broke_down_is_no_rival():
+    broken = {"effects": ["aging"], "information_criterion": None, "held_out_chi2_per_sample": None}
+    assert rivals.by_all_subsets(RESULT | {"sets": [broken, *RESULT["sets"]]}) == (("slack", "drift"), 1.1)
+
+
 def test_nothing_to_name():
     quiet = {"candidates": [], "sets": [], "before": {}}
     for ask in (rivals.by_score, rivals.by_refit, rivals.by_hold_out, rivals.by_all_subsets):

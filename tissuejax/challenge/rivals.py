@@ -43,7 +43,10 @@ def by_hold_out(result: dict) -> Answer:
 
 def by_all_subsets(result: dict) -> Answer:
     """The set of smallest Schwarz criterion on the fitted recordings among all refitted; no hold-out, no verdict."""
-    best = min(result.get("sets", ()), key=lambda s: s["information_criterion"], default=None)
+    finite = [
+        s for s in result.get("sets", ()) if s["information_criterion"] is not None
+    ]  # a refit may have broken down
+    best = min(finite, key=lambda s: s["information_criterion"], default=None)
     if best is None or not best["effects"]:
         return (), held_out_before(result)
     return tuple(dict.fromkeys(key.split("/")[0] for key in best["effects"])), _held(best)
