@@ -110,3 +110,23 @@ def test_held_out_recordings_that_are_missed_far_more_ask_for_values_of_their_ow
     misfit = SimpleNamespace(residual=lambda prediction, names: np.full(10, 3.0), whiten=lambda x, names: x)
     s = SimpleNamespace(refits={frozenset(): parent}, bench=Outside(), misfit=misfit, names=lambda keys: frozenset())
     assert probing_search.asked_outside(s, frozenset()) == asked
+
+
+@pytest.mark.parametrize(("noise", "grown", "begun"), [(False, "b", ["a"]), (True, "b", []), (False, "a", [])])
+def test_the_best_scored_candidate_is_refitted_unless_it_was_or_something_explains_the_rest(
+    monkeypatch, noise, grown, begun
+):
+    asked = []
+    parent = Fit((), 0.0, 1.0)
+    monkeypatch.setattr(probing_search, "replace", lambda fit, values: fit)
+    monkeypatch.setattr(probing_search, "quality", lambda s, r: SimpleNamespace(noise=noise))
+    monkeypatch.setattr(probing_search, "settled", lambda s, r: False)
+    monkeypatch.setattr(probing_search, "finish", lambda s, keys, start: asked.append(*keys) or Fit(keys, 0.0, 1.0))
+    parent.values = {}
+    s = SimpleNamespace(
+        refits={frozenset(): parent, frozenset(grown): parent}, report=lambda _: None, names=lambda keys: keys
+    )
+    nominated = [SimpleNamespace(key="a", setting={}), SimpleNamespace(key="c", setting={})]
+    found = probing_search.favourite(s, frozenset(), nominated, [frozenset(grown)])
+    assert asked == begun
+    assert found == [frozenset(k) for k in begun]

@@ -32,9 +32,7 @@ CLOSE = 0.85  # the same, once one refit leaves nothing but noise
 BRIEF, LACKING = 3, 0.25  # iterations without one effect, and the share of what was missing that makes it needed
 ELSEWHERE = 0.5  # of the best place's gain: the least for an inclusion to be tried under another site
 OUTSIDE = 3.0  # times the misfit of the fitted recordings: from there on the held-out ones are asked what they lack
-MOSTLY = (
-    0.5  # share of the held-out misfit that their own values must take up, and that a set must explain to be led by
-)
+MOSTLY = 0.5  # share of the held-out misfit that own values must take up, and that a leading set must explain
 
 
 def search_probing(bench: ProbingBench, budget: Budget, report: Callable[[str], None] = lambda _: None) -> Search:
@@ -153,24 +151,23 @@ def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
         done = s.refits[keys] = under_another_site(s, parent, score, finish(s, trial.keys, trial))
         s.report(f"{' + '.join(trial.keys)}: chi-square {done.chi2 / done.n:.3g}")
         grown.append(keys)
-    return grown + favourite(s, at, nominated[:1], grown)
+    return grown + favourite(s, at, nominated, grown)
 
 
-def favourite(s: Search, at: frozenset, first: list[Score], grown: list[frozenset]) -> list[frozenset]:
+def favourite(s: Search, at: frozenset, nominated: list[Score], grown: list[frozenset]) -> list[frozenset]:
     """The set with the candidate of the best score, if its one step led too far (a support nearly free, say), and
     nothing else explains the rest: refitted from the parent, in steps as long as the simulation bears them."""
-    parent = s.refits[at]
-    if any(quality(s, s.refits[k]).noise or settled(s, s.refits[k]) for k in grown):
+    explained = any(quality(s, s.refits[k]).noise or settled(s, s.refits[k]) for k in grown)
+    if explained or not nominated:
         return []
-    found = []
-    for score in first:
-        keys = at | {score.key}
-        if s.names(keys) not in [s.names(k) for k in grown]:
-            s.report(f"{' + '.join([*parent.keys, score.key])}, in shorter steps")
-            start = replace(parent, values={**parent.values, **score.setting})
-            s.refits[keys] = finish(s, (*parent.keys, score.key), start)
-            found.append(keys)
-    return found
+    parent, best = s.refits[at], nominated[0]
+    keys = at | {best.key}
+    if s.names(keys) in [s.names(k) for k in grown]:
+        return []
+    s.report(f"{' + '.join([*parent.keys, best.key])}, in shorter steps")
+    start = replace(parent, values={**parent.values, **best.setting})
+    s.refits[keys] = finish(s, (*parent.keys, best.key), start)
+    return [keys]
 
 
 def nominees(s: Search, at: frozenset) -> list[Score]:

@@ -17,9 +17,7 @@ from tissuejax.diagnosis.misfit import Misfit
 
 HOPELESS = 5e-4  # of what exceeds noise: a fit that leaves much is not polished
 NOTHING = 1e-5  # of the largest effect of a parameter, each moved by its scale: what a one-sided difference errs by
-FREE = (
-    1e-4  # damping below which a true Jacobian's step is as long as the data allow: one that gains nothing is the end
-)
+FREE = 1e-4  # damping below which a step of a true Jacobian that gains nothing is the end
 ENOUGH = 2e-3  # of chi-square: where a prediction is a simulation, a step that promises less is not taken
 
 
