@@ -22,7 +22,9 @@ from tissuejax.parameters import under
 from tissuejax.tensors import Sym
 
 NODES = 49  # stretches at which lateral shapes are found first
-STEPS = 14  # of Newton there; from between them one step and a last one do
+STEPS = 60  # of Newton at most; two to six do
+MET = 1e-7  # of the shear modulus: what the stress across may be before the last step
+WIDEST = 2.0  # half the logarithm of the ratio of the lateral stretches: no specimen is narrowed so one-sidedly
 
 
 def lateral(
@@ -83,24 +85,51 @@ def _each(residual: Callable[[Array], Array], start: Float[Array, " n"]) -> Floa
 def _along(residual: Callable[[Array, Array], Array], drive: Float[Array, " n"]) -> Float[Array, " n"]:
     """Roots y of residual(y, drive), a function of the drive of the moment alone; NaN where none was found.
 
-    Roots at a few drives, straight lines between them (error 1e-5), then two Newton steps at all samples. The last is
-    taken from a point held fixed, with the slope there, which makes its derivative that of the implicit function.
+    Roots at a few drives, straight lines between them (error 1e-5), then Newton at all samples. Two rounds do, except
+    where fibres begin or cease to bear load between two nodes: no straight line follows that, and a step may land on
+    the wrong side. The derivative is that of the implicit function: dy = -(dresidual at y held) / slope.
+    """
+    few = jax.lax.stop_gradient(jnp.linspace(jnp.min(drive), jnp.max(drive), NODES))
+    at_few, few_held = jax.closure_convert(residual, few, few)
+    known = _still(lambda y: at_few(y, few, *jax.lax.stop_gradient(few_held)), jnp.zeros_like(few))
+    near = jnp.interp(jax.lax.stop_gradient(drive), few, jnp.where(jnp.isfinite(known), known, 0.0))
+    fixed, held = jax.closure_convert(residual, drive, drive)
+
+    @jax.custom_jvp
+    def roots(near: Array, at: Array, *held: Array) -> Array:
+        return _still(lambda y: fixed(y, at, *held), near)
+
+    @roots.defjvp
+    def implicit(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
+        (near, *told), (_, *moved) = primals, tangents
+        y = roots(near, *told)
+        _, moving = jax.jvp(lambda *told: fixed(y, *told), tuple(told), tuple(moved))
+        _, slope = jax.jvp(lambda x: fixed(x, *told), (y,), (jnp.ones_like(y),))
+        return y, -moving / slope
+
+    return roots(near, drive, *held)
+
+
+def _still(residual: Callable[[Array], Array], start: Float[Array, " m"]) -> Float[Array, " m"]:
+    """Roots of m equations of one unknown each, of which no derivative can be taken; NaN where none was found.
+
+    Newton inside a bracket, which is halved where a step would leave it: `residual` grows with its unknown (the wider
+    a face is held, the harder it pulls).
     """
 
-    def newton(y: Array, at: Array) -> tuple[Array, Array]:
-        r, slope = jax.jvp(lambda x: residual(x, at), (y,), (jnp.ones_like(y),))
-        return r, jax.lax.stop_gradient(slope)
+    def step(state: tuple) -> tuple:
+        y, low, high, _, count = state
+        r, slope = jax.jvp(residual, (y,), (jnp.ones_like(y),))
+        low, high = jnp.where(r < 0, y, low), jnp.where(r < 0, high, y)
+        new = y - r / slope
+        return jnp.where((new >= low) & (new <= high), new, 0.5 * (low + high)), low, high, jnp.abs(r), count + 1
 
-    def step(y: Array, at: Array) -> Array:
-        r, slope = newton(y, at)
-        return y - r / slope
+    def unsettled(state: tuple) -> Array:
+        return jnp.any(~(state[3] < MET)) & (state[4] < STEPS)
 
-    seen = jax.lax.stop_gradient(drive)
-    few = jnp.linspace(jnp.min(seen), jnp.max(seen), NODES)
-    known = jax.lax.fori_loop(0, STEPS, lambda _, y: step(y, few), jnp.zeros_like(few))
-    near = jax.lax.stop_gradient(step(jnp.interp(seen, few, jnp.where(jnp.isfinite(known), known, 0.0)), seen))
-    r, slope = newton(near, drive)
-    return jnp.where(jnp.abs(r) < 1e-6, near - r / slope, jnp.nan)
+    begin = (start, jnp.full_like(start, -WIDEST), jnp.full_like(start, WIDEST), jnp.full_like(start, jnp.inf), 0)
+    y, _, _, r, _ = jax.lax.while_loop(unsettled, step, begin)
+    return jnp.where(r < MET, y, jnp.nan)
 
 
 def _root(residual: Callable[[Array], Array], start: Float[Array, " m"], tags: frozenset = frozenset()) -> Array:
