@@ -168,6 +168,7 @@ def held_in(f: Free, most: float) -> Free:
 
 
 SPREAD = math.log(5.0)
+OFF_AXES = (0.4, 1.2, 2.0, 2.7)
 TIMES = tuple(float(t) for t in np.geomspace(0.1, 60.0, 7))
 
 
@@ -290,7 +291,7 @@ def entries(sizes: Sizes) -> list[Entry]:
                 Form(
                     "two families",
                     ("k1", "k2", "angle", "spread"),
-                    {"spread": (0.4,)},
+                    {"spread": (0.4,), "angle": OFF_AXES},  # one family may lie along an axis, and two alike about it
                     nominated=False,
                     most={"k2": fibres},
                 ),

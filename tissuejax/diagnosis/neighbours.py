@@ -41,7 +41,10 @@ def neighbours(s, parent: Refit) -> list[frozenset]:
                 s.report(" + ".join(order))
                 starts = [{**parent.values, **setting} for setting in s.bench.candidates[new].grid]
                 if len(at) == 1 or s.bench.dear:
-                    s.refits[key] = s.finished(order, starts[: s.budget.starts + (not s.bench.dear)])
+                    cheap = not s.bench.dear
+                    whole = cheap and not s.bench.candidates[new].nominated  # no score tells which start is promising
+                    most = len(starts) if whole else s.budget.starts + cheap
+                    s.refits[key] = s.finished(order, starts[:most])
                     known.append(key)
                 else:
                     begun.append(s.begun(order, starts[: s.budget.starts], held=True))
