@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from spring_bench import spring
 
+from tissuejax.diagnosis.bench import Free
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.refit import Descent, refit
 
@@ -61,3 +62,31 @@ def test_a_value_is_on_its_bound_only_where_it_is():
     r = np.zeros(bench.mask(bench.fitted).sum())
     assert descent.errors(np.array([10.0, 5e-7]), r)[1] == ()
     assert descent.errors(np.array([10.0, 0.0]), r)[1] == ("relax.g",)
+
+
+def test_an_angle_beside_an_axis_does_not_hold_up_the_rest():
+    """y = a x + 1.05 k x^2 against a x + k cos(t)^2 x^2 from t = 0.001: no angle gives more than k, and a is free."""
+    x, k = np.linspace(0.0, 0.4, 60), 1500.0
+    y = 2000.0 * x + 1.05 * k * x**2
+
+    class Turned:
+        free, base, dear = {"a": Free(0, np.inf, 500, "Pa"), "t": Free(-7, 7, 0.3, "rad")}, (), False
+
+        def predict(self, values, recordings=None):
+            return values["a"] * x + k * np.cos(values["t"]) ** 2 * x**2
+
+        def jacobian(self, values, paths, recordings=None):
+            columns = {"a": x, "t": -k * np.sin(2 * values["t"]) * x**2}
+            return np.stack([columns[p] for p in paths], 1)
+
+    class Plain:
+        def residual(self, prediction, recordings):
+            return y - prediction
+
+        def whiten(self, jac, recordings):
+            return jac
+
+    end, *_ = Descent(Turned(), Plain(), ("a", "t"), ("r",), {}).run(np.array([1500.0, 1e-3]), 30, 1e-3)
+    expected = 2000.0 + 0.05 * k * np.sum(x**3) / np.sum(x**2)  # least squares of what is left, at cos(t) = 1
+    assert end[0] == pytest.approx(expected, rel=1e-4)
+    assert np.cos(end[1]) ** 2 == pytest.approx(1.0, abs=1e-3)

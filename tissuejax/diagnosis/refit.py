@@ -18,6 +18,7 @@ from tissuejax.diagnosis.misfit import Misfit
 HOPELESS = 5e-4  # of what exceeds noise: a fit that leaves much is not polished
 NOTHING = 1e-5  # of the largest effect of a parameter, each moved by its scale: what a one-sided difference errs by
 FREE = 1e-4  # damping below which a step of a true Jacobian that gains nothing is the end
+TURN = 0.8  # rad: the longest step of an angle, a quarter of it after every step that gained nothing
 ENOUGH = 2e-3  # of chi-square: where a prediction is a simulation, a step that promises less is not taken
 
 
@@ -74,6 +75,8 @@ class Descent:
         self.low = np.array([np.log(f.lower) if f.log else f.lower for f in free])
         self.high = np.array([np.log(f.upper) if f.log else f.upper for f in free])
         self.scale = np.array([1.0 if f.log else f.scale for f in free])
+        # near an axis of the tests an angle has next to no slope and wants several turns: the rest must not wait for it
+        self.turns = np.array([f.unit == "rad" and not self.bench.dear for f in free], bool)
         self.last: np.ndarray | None = None
         self.priors = [(i, *f.prior) for i, f in enumerate(free) if f.prior is not None]
 
@@ -145,9 +148,11 @@ class Descent:
             q, t = np.linalg.qr(np.where(nothing, 0.0, jac))
             right = q.T @ r
             size = np.maximum(size, 1e-9 * np.max(size, initial=0.0) + 1e-6 / self.scale)
-            for _ in range(4 if dear else 10):
+            for tried in range(4 if dear else 10):
+                reach = np.where(self.turns, TURN / 4**tried, np.inf)
+                low, high = np.maximum(self.low - x, -reach), np.minimum(self.high - x, reach)
                 a = np.vstack([t, np.diag(np.sqrt(damping) * size)])
-                step = bounded(a, np.concatenate([right, np.zeros(len(x))]), self.low - x, self.high - x)
+                step = bounded(a, np.concatenate([right, np.zeros(len(x))]), low, high)
                 trial = np.clip(x + step, self.low, self.high)
                 step = trial - x
                 left = r - jac @ step
