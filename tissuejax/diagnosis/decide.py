@@ -101,19 +101,26 @@ def needed(s: Search, larger: Refit, smaller: Refit) -> bool:
         noise = quality(s, larger).noise and (not quality(s, smaller).noise or veiled(s, smaller))
         least = max(seen, NEEDED / 4 * sum(excess(s, s.empty))) if s.bench.dear else 3 * GAIN
         return noise and gained > least and (outside > GAIN / 2 or not larger.n_held)
+    if not s.bench.dear and blind(s, larger, smaller) and most(s, larger, smaller, fitted=True):
+        return True
     # of a misfit no larger than noise (only its correlation tells) any share is a share of next to nothing
     missing = sum(excess(s, s.empty)) > SIGNIFICANT * math.sqrt(2 * (larger.n + larger.n_held))
     return outside > 0 or (share > HELPLESS and (missing or s.bench.dear)) or not larger.n_held
 
 
-def most(s: Search, larger: Refit, smaller: Refit) -> bool:
+def most(s: Search, larger: Refit, smaller: Refit, fitted: bool = False) -> bool:
     """Whether `larger` takes away a share `MOST` of what `smaller` leaves, where that exceeds the noise itself.
 
-    In the fitted recordings and in the held-out ones alike. Beside an effect a hundred times the noise one of ten times
-    is a small share of the misfit, and is there all the same.
+    In the fitted recordings and, unless these are asked alone, in the held-out ones alike. Beside an effect a hundred
+    times the noise one of ten times is a small share of the misfit, and is there all the same.
     """
     pairs = list(zip(excess(s, smaller), excess(s, larger), (smaller.n, smaller.n_held)))
-    return all(before > n and after < (1 - MOST) * before for before, after, n in pairs if n)
+    return all(before > n and after < (1 - MOST) * before for before, after, n in pairs[: 1 if fitted else 2] if n)
+
+
+def blind(s: Search, larger: Refit, smaller: Refit) -> bool:
+    """Whether the held-out recordings are noise to both: they neither ask for the effect nor speak against it."""
+    return all(quality(s, r).z_held < SIGNIFICANT for r in (larger, smaller))
 
 
 def worse(s: Search, r: Refit) -> bool:

@@ -30,12 +30,16 @@ def doubts(bench: Bench, misfit: Misfit, r: Refit) -> tuple[str, ...]:
     """Reasons, in words, why the names in `r` are not to be believed; empty where they may be."""
     if bench.dear or not np.isfinite(r.chi2):
         return ()
-    out = tuple(
+    return on_limit(bench, r) + periodic(bench, misfit, r)
+
+
+def on_limit(bench: Bench, r: Refit) -> tuple[str, ...]:
+    """Exponents in `r` that have run away: as named the law is not to be believed, in another form it may be."""
+    return tuple(
         f"{path} rests on its limit of {bench.free[path].upper:.3g}"
         for path in r.at_bound
         if bench.free[path].limited and abs(r.values[path]) > 0.99 * bench.free[path].upper
     )
-    return out + periodic(bench, misfit, r)
 
 
 def periodic(bench: Bench, misfit: Misfit, r: Refit) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from tissuejax.diagnosis.bench import Bench, Candidate
 from tissuejax.diagnosis.kept_refits import KeptRefits
 from tissuejax.diagnosis.misfit import Misfit, estimated, white
 from tissuejax.diagnosis.neighbours import leave_out, reshape
-from tissuejax.diagnosis.plausible import doubts
+from tissuejax.diagnosis.plausible import doubts, on_limit
 from tissuejax.diagnosis.quality import quality
 from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.score import Score, scores
@@ -27,6 +27,7 @@ from tissuejax.errors import NotConverged
 
 LEAST = 2  # sets finished at each size, whatever they cost
 ELSEWHERE = 2  # other places to start from that are followed to the end
+SHORT = 4  # settings of a shape that are all tried where nothing is named yet
 ALLOWED = 1.5  # chi-square per sample up to which a fit explains its recordings
 
 
@@ -61,7 +62,7 @@ class Budget:
     finished: tuple[int, ...] = (6, 4, 3)
     promise: float = 0.6
     patience: tuple[float, ...] = (5e3, 1.5e4, 2.5e4)
-    spend: tuple[float, ...] = (3e4, 3e4, 5e4, 6e4)
+    spend: tuple[float, ...] = (2.5e4, 4e4, 5e4, 6e4)
     burden: int = 2
 
 
@@ -210,7 +211,7 @@ class Search:
             candidate = self.bench.candidates[score.key]
             starts = [
                 {**parent.values, **setting, **inside(self.bench, candidate, step, setting, parent.values)}
-                for _, step, setting in distinct(score, self.budget.starts)
+                for _, step, setting in distinct(score, self.budget.starts, whole=not keys and not self.bench.dear)
             ]
             order = (*parent.keys, score.key)
             if self.exhausted:
@@ -274,8 +275,13 @@ def inside(
     return out
 
 
-def distinct(score: Score, most: int) -> list[tuple[float, dict, dict]]:
-    """The best settings whose gains are worth a start of their own."""
+def distinct(score: Score, most: int, whole: bool = False) -> list[tuple[float, dict, dict]]:
+    """The best settings whose gains are worth a start of their own; all of a short list if `whole`.
+
+    A linear step ranks directions of strong fibres badly: those that it sees first shorten and go slack.
+    """
+    if whole and len(score.settings) <= SHORT:
+        return list(score.settings)
     kept = list(score.settings[:1])
     for trial in score.settings[1:]:
         if len(kept) >= most or trial[0] < 0.5 * kept[0][0]:
@@ -318,7 +324,7 @@ def search(
             break
         if size == 0 and not bench.dear:
             renew_noise(s)
-        for keys in best_of_each(s)[: 1 if bench.dear else (4, 2, 1)[min(size, 2)]]:
+        for keys in promising(s, 1 if bench.dear else (4, 2, 1)[min(size, 2)]):
             reshape(s, keys)
         short |= s.exhausted
         best = s.best
@@ -356,6 +362,21 @@ def best_of_each(s: Search) -> list[frozenset]:
     for keys in sorted((k for k in s.refits if not s.doubts(k)), key=lambda k: s.criterion(s.refits[k])):
         out.setdefault(s.names(keys), keys)
     return list(out.values())
+
+
+def promising(s: Search, most: int) -> list[frozenset]:
+    """Sets whose effects are tried in other forms: the best `most`, and any better one in which an exponent ran away.
+
+    Fibres that stiffen without end are not believed; they may be crimped, which is the form beside.
+    """
+    kept = best_of_each(s)[:most]
+    if s.bench.dear or not kept:
+        return kept
+    names = [s.names(k) for k in kept]
+    worst = max(s.criterion(s.refits[k]) for k in kept)
+    astray = [r for k, r in s.refits.items() if s.names(k) not in names and on_limit(s.bench, r)]
+    best = sorted((r for r in astray if s.criterion(r) < worst), key=s.criterion)[:1]
+    return kept + [frozenset(r.keys) for r in best]
 
 
 def renew_noise(s: Search) -> None:
