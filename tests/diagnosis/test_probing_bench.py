@@ -113,6 +113,7 @@ def test_mesh_step_and_penalty_are_told_apart(bench):
     assert set(found.rms) == {"mesh", "step", "penalty"} == set(found.amplitudes)
     assert all(0 < found.rms[choice]["force"] < 30 for choice in ("step", "penalty"))
     assert 0 <= found.gain <= base.chi2
+    assert found.held <= base.held
     assert all(abs(a) <= 1.5 + 1e-9 for a in found.amplitudes.values())
 
 

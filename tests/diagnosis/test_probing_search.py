@@ -130,3 +130,27 @@ def test_the_best_scored_candidate_is_refitted_unless_it_was_or_something_explai
     found = probing_search.favourite(s, frozenset(), nominated, [frozenset(grown)])
     assert asked == begun
     assert found == [frozenset(k) for k in begun]
+
+
+@pytest.mark.parametrize(
+    ("chi2", "noise", "enough", "answer", "asked"),
+    [
+        (1.3, False, True, True, 1),  # a lag of our own making: nothing to look for beside
+        (1.3, False, False, False, 1),
+        (1.0, True, False, True, 0),
+        (2.5, False, True, False, 0),  # no simulation is as wrong as that: three more runs would tell nothing
+    ],
+)
+def test_what_a_found_effect_leaves_is_asked_whether_it_is_numerical(monkeypatch, chi2, noise, enough, answer, asked):
+    seen = []
+
+    def numerics(bench, misfit, r):
+        seen.append(r)
+        return SimpleNamespace(enough=lambda at: enough)
+
+    monkeypatch.setattr(probing_search, "numerics", numerics)
+    monkeypatch.setattr(probing_search, "quality", lambda s, r: SimpleNamespace(noise=noise))
+    monkeypatch.setattr(probing_search, "settled", lambda s, r: False)
+    s = SimpleNamespace(bench=SimpleNamespace(numerics={}), misfit=None, report=lambda _: None)
+    assert probing_search.explained(s, Fit(("base-slip",), 0.0, 1.0, chi2=chi2)) is answer
+    assert len(seen) == asked

@@ -3,12 +3,12 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-from tissuejax.diagnosis.decide import SEEN_DEAR, SURE_DEAR, needed, too_little
+from tissuejax.diagnosis.decide import MIMICKED, SEEN_DEAR, SURE_DEAR, needed, too_little
 from tissuejax.diagnosis.quality import CHANNEL, TOLERATED_HELD, VEILED, Quality, veiled
 
 
 def searched(gain: float, numerical: float | None = None, dear: bool = True, keys: tuple[str, ...] = ()):
-    numerics = None if numerical is None else SimpleNamespace(gain=numerical)
+    numerics = {} if numerical is None else {frozenset(): SimpleNamespace(gain=numerical)}
     scores = [SimpleNamespace(gain=gain), SimpleNamespace(gain=0.0)]
     return SimpleNamespace(bench=SimpleNamespace(dear=dear, numerics=numerics), scored={frozenset(keys): scores})
 
@@ -43,7 +43,7 @@ def fits_of(gained: float, n: int = 10_000):
         return SimpleNamespace(keys=keys, chi2=chi2, held=chi2, n=n, n_held=n, k=3, own={})
 
     small, large = fit((), 1.04 * n), fit(("softening",), 1.04 * n - gained / 2)
-    bench = SimpleNamespace(dear=True, numerics=None)
+    bench = SimpleNamespace(dear=True, numerics={})
     search = SimpleNamespace(
         bench=bench, empty=small, scored={}, criterion=lambda r: 2 * r.chi2, outside=lambda r: r.chi2
     )
@@ -53,6 +53,16 @@ def fits_of(gained: float, n: int = 10_000):
 def test_an_effect_that_gains_less_than_laws_and_meshes_differ_by_is_not_needed():
     assert not needed(*fits_of(0.5 * SEEN_DEAR * 20_000))
     assert needed(*fits_of(1.5 * SEEN_DEAR * 20_000))
+
+
+def test_what_mesh_and_step_would_take_up_as_well_is_no_second_effect():
+    search, large, small = fits_of(6 * SEEN_DEAR * 20_000)
+    gained = small.chi2 - large.chi2
+    small.keys, large.keys = ("base-slip",), ("base-slip", "clock-lag")
+    search.bench.numerics[frozenset(small.keys)] = SimpleNamespace(gain=0.9 * gained / MIMICKED)
+    assert needed(search, large, small)
+    search.bench.numerics[frozenset(small.keys)] = SimpleNamespace(gain=1.1 * gained / MIMICKED)
+    assert not needed(search, large, small)
 
 
 def test_a_set_that_leaves_half_of_a_weak_misfit_is_not_what_was_missing_though_noise_is_all_that_is_left():

@@ -116,7 +116,8 @@ class Bench(abc.ABC):
         warnings: sentences for the reader.
         dear: True where a prediction is a simulation: noise is taken as recorded, and refits stop early.
         spent: cost of all predictions so far, in those of the plain base model (see `Budget.spend`).
-        numerics: of simulations: what mesh, step and penalty leave open (`probing_numerics.Numerics`), once known.
+        numerics: of simulations: what mesh, step and penalty leave open at the fit of a set of candidates
+            (`probing_numerics.Numerics`), where that was asked.
     """
 
     segments: Sequence[Segment]
@@ -131,7 +132,7 @@ class Bench(abc.ABC):
     warnings: list[str] = field(default_factory=list)
     dear: bool = False
     spent: float = 0.0
-    numerics: Any = None
+    numerics: dict[frozenset, Any] = field(default_factory=dict)
 
     @abc.abstractmethod
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:

@@ -31,6 +31,7 @@ LEFT = 0.15
 LEFT_SEEN = 0.06  # the same where what is left exceeds the noise itself: a quarter of the size
 LEFT_DEAR, CLOSE_DEAR, SEEN_DEAR = 0.08, 0.01, 0.05  # where a prediction is a simulation
 HALF_DEAR = 0.4  # share that may be left at most there, however near to noise: true effects left a sixth or less
+MIMICKED = 1.5  # times what the simulation's own error takes up: what an effect beside a found one gains at least
 TEMPER = 4.0
 # How often an answer should be right: round numbers from development cases of material tests, after the opened seed
 # 88213 had shown that the former ones were too sure. Names that leave noise were right in nearly all, names that leave
@@ -93,6 +94,8 @@ def needed(s: Search, larger: Refit, smaller: Refit) -> bool:
     seen = SEEN_DEAR * (larger.n + larger.n_held) if s.bench.dear else 0.0  # laws and meshes differ by as much
     if gained < max(GAIN, seen):
         return False
+    if mimicked(s, larger, smaller):
+        return False
     share = (sum(excess(s, smaller)) - sum(excess(s, larger))) / max(sum(excess(s, s.empty)), 1e-9)
     outside = s.outside(smaller) - s.outside(larger)
     if share < NEEDED and not s.bench.dear and most(s, larger, smaller):
@@ -106,6 +109,12 @@ def needed(s: Search, larger: Refit, smaller: Refit) -> bool:
     # of a misfit no larger than noise (only its correlation tells) any share is a share of next to nothing
     missing = sum(excess(s, s.empty)) > SIGNIFICANT * math.sqrt(2 * (larger.n + larger.n_held))
     return outside > 0 or (share > HELPLESS and (missing or s.bench.dear)) or not larger.n_held
+
+
+def mimicked(s: Search, larger: Refit, smaller: Refit) -> bool:
+    """Whether mesh, step and penalty take up nearly as much beside the smaller set as the effect added to it."""
+    known = s.bench.numerics.get(frozenset(smaller.keys)) if smaller.keys else None
+    return known is not None and smaller.chi2 - larger.chi2 < MIMICKED * known.gain
 
 
 def most(s: Search, larger: Refit, smaller: Refit, fitted: bool = False) -> bool:
@@ -173,7 +182,10 @@ def decide(s: Search) -> Verdict:
     explained = tuple(1 - b / a if a > 0 else 1.0 for a, b in zip(e0, e1))
     reasons = []
     rivals: tuple[Refit, ...] = ()
-    numerical = s.bench.numerics
+    numerical = s.bench.numerics.get(frozenset(chosen.keys))
+    if numerical is not None and chosen.keys:  # what its simulation has wrong does not speak against a set
+        e1 = tuple(max(e - n, 0.0) for e, n in zip(e1, (numerical.gain, numerical.held)))
+        reasons.append(f"mesh, step and penalty of the simulation account for {numerical.share:.0%} of what is left")
     if not chosen.keys and not before.noise and numerical is not None and numerical.enough(empty):
         kind = "nothing-missing"
         reasons.append(f"mesh, step and penalty of the simulation account for {numerical.share:.0%} of what is left")

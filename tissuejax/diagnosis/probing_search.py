@@ -28,6 +28,7 @@ TRIED = 5  # candidates that take a step
 PROMISING = 0.1  # of the best score: the least for a step
 RIVALS = 0.3  # of the best step's gain: the least for a refit; a step from far off tells little
 SETTLED, NEARLY = 0.03, 1.3  # share of the base's excess, and chi-square per sample, that a found effect may leave
+MODEST = 2.0  # chi-square per sample above which no simulation is as wrong as that
 CLOSE = 0.85  # the same, once one refit leaves nothing but noise
 BRIEF, LACKING = 3, 0.25  # iterations without one effect, and the share of what was missing that makes it needed
 ELSEWHERE = 0.5  # of the best place's gain: the least for an inclusion to be tried under another site
@@ -56,13 +57,13 @@ def search_probing(bench: ProbingBench, budget: Budget, report: Callable[[str], 
         )
     s.refits[frozenset()] = first
     report("numerical error")
-    bench.numerics = numerics(bench, s.misfit, first)
+    bench.numerics[frozenset()] = numerics(bench, s.misfit, first)
     at = frozenset()
     for size in range(budget.most):
         parent = s.refits[at]
         report(f"scores beside {' + '.join(parent.keys) or 'the base'} (chi-square {parent.chi2 / parent.n:.3g})")
         s.score(at)
-        calm = quality(s, parent).noise or (not at and bench.numerics.enough(first))
+        calm = quality(s, parent).noise or (not at and bench.numerics[at].enough(first))
         if calm and not veiled(s, parent):
             break
         grown = grow(s, at, budget.nominees[min(size, len(budget.nominees) - 1)])
@@ -74,9 +75,24 @@ def search_probing(bench: ProbingBench, budget: Budget, report: Callable[[str], 
         if len(best) > 1:
             leave_out(s, best)
         at = best
-        if quality(s, s.refits[best]).noise or settled(s, s.refits[best]):
+        if explained(s, s.refits[best]):
             break
     return s
+
+
+def explained(s: Search, r: Refit) -> bool:
+    """Whether what r leaves is noise, too little to look further, or no more than its own simulation has wrong.
+
+    An effect may call for a finer simulation than the base did: a support that hardly holds lags behind at ten times
+    the speed of life, and a lag of the clocks would take that up.
+    """
+    if quality(s, r).noise or settled(s, r):
+        return True
+    if r.chi2 > MODEST * r.n:
+        return False
+    s.report(f"numerical error beside {' + '.join(r.keys)}")
+    found = s.bench.numerics[frozenset(r.keys)] = numerics(s.bench, s.misfit, r)
+    return found.enough(r)
 
 
 def settled(s: Search, r: Refit) -> bool:

@@ -91,5 +91,6 @@ def veiled(s, r: Refit) -> bool:
     """
     scores = s.scored.get(frozenset(r.keys), ())
     best = max((score.gain for score in scores), default=0.0)
-    numerical = s.bench.numerics.gain if s.bench.numerics is not None else 0.0
+    known = s.bench.numerics.get(frozenset(r.keys), s.bench.numerics.get(frozenset()))
+    numerical = known.gain if known is not None else 0.0
     return s.bench.dear and best > VEILED * r.n and best > 1.5 * numerical

@@ -58,7 +58,8 @@ class Diagnosis:
             "before": self.errors(s.empty),
             "after": self.errors(v.chosen),
             "base_parameters": self.base(),
-            "numerical_error": bench.numerics.as_dict() if bench.numerics else None,
+            "numerical_error": self.numerical(s.empty),
+            "numerical_error_after": self.numerical(v.chosen),
             "noise": {c: {"correlated_share": n.share, "correlation": n.rho} for c, n in s.misfit.noises.items()},
             "explained": {"fitted": v.explained[0], "held_out": v.explained[1] if bench.held_out else None},
             "fitted": list(bench.fitted),
@@ -69,6 +70,11 @@ class Diagnosis:
             "seconds": self.seconds,
             "versions": {name: version(name) for name in ("tissuejax", "jax", "numpy", "scipy")},
         }
+
+    def numerical(self, r: Refit) -> dict | None:
+        """What the simulation has wrong at a fit, where that was asked."""
+        known = self.search.bench.numerics.get(frozenset(r.keys))
+        return known.as_dict() if known else None
 
     def effects(self, r: Refit) -> list[dict]:
         """Effects of a fit in the order in which they were added, with parameters, standard errors and units."""
