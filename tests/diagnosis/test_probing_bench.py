@@ -115,6 +115,7 @@ def test_mesh_step_and_penalty_are_told_apart(bench):
     assert 0 <= found.gain <= base.chi2
     assert found.held <= base.held
     assert all(abs(a) <= 1.5 + 1e-9 for a in found.amplitudes.values())
+    assert found.amplitudes["step"] >= 0, "no recording was made slower than life"
 
 
 def test_a_stopped_diagnosis_finds_its_runs_again(pressed_too_deep, tmp_path):

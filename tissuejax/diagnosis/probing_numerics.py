@@ -84,7 +84,9 @@ def numerics(bench: ProbingBench, misfit: Misfit, at: Refit) -> Numerics:
     slopes = bench.jacobian(at.all, bench.base, every)
     basis, columns = complement(misfit.whiten(slopes, names)), misfit.whiten(moved, names)
     r, columns = (x - basis @ (basis.T @ x) for x in (r, columns))
-    taken, amplitudes = gain(r, columns, np.full(3, -MOST), np.full(3, MOST))
+    # whoever made the recordings may have been on the other side of the limit of mesh and penalty, but not of time
+    least = [0.0 if choice == "step" else -MOST for choice in varied]
+    taken, amplitudes = gain(r, columns, np.array(least), np.full(len(varied), MOST))
     held = 0.0
     if bench.held_out:  # the base's parameters give way there as they did in the fitted recordings
         given, *_ = np.linalg.lstsq(misfit.whiten(slopes, names), misfit.whiten(moved @ amplitudes, names), rcond=None)
