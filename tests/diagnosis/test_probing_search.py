@@ -154,3 +154,49 @@ def test_what_a_found_effect_leaves_is_asked_whether_it_is_numerical(monkeypatch
     s = SimpleNamespace(bench=SimpleNamespace(numerics={}), misfit=None, report=lambda _: None)
     assert probing_search.explained(s, Fit(("base-slip",), 0.0, 1.0, chi2=chi2)) is answer
     assert len(seen) == asked
+
+
+def test_a_pair_that_leaves_something_is_begun_again_from_its_second_effect(monkeypatch):
+    """a was chosen while b was missing; beside b alone it is c that explains the rest."""
+    fits = {k: Fit(tuple(k), 0.0, 1.0, chi2=c) for k, c in {"": 100.0, "a": 40.0, "ab": 20.0, "b": 45.0}.items()}
+    refits = {frozenset(k): r for k, r in fits.items()}
+    begun, left_out = [], []
+
+    def grow(s, at, most):
+        begun.append(at)
+        s.refits[frozenset("bc")] = Fit(("b", "c"), 0.0, 1.0, chi2=5.0)
+        return [frozenset("bc")]
+
+    monkeypatch.setattr(probing_search, "grow", grow)
+    monkeypatch.setattr(probing_search, "richer", lambda s, at: at)
+    monkeypatch.setattr(probing_search, "leave_out", lambda s, at: left_out.append(at))
+    candidates = {k: SimpleNamespace(amplitudes=()) for k in "abc"}
+    s = SimpleNamespace(
+        refits=refits,
+        score=lambda at: [],
+        report=lambda _: None,
+        criterion=lambda r: r.chi2,
+        bench=SimpleNamespace(free={}, candidates=candidates),
+    )
+    monkeypatch.setattr(Fit, "at_bound", (), raising=False)
+    probing_search.begin_with_the_second(s, frozenset("ab"), 1)
+    assert begun == [frozenset("b")]
+    assert left_out == [frozenset("bc")]
+
+
+@pytest.mark.parametrize(("value", "chi2", "kept"), [(2.0, 5.0, 5.0), (2.0, 30.0, 20.0), (1.9, 5.0, 20.0)])
+def test_an_amplitude_that_ran_to_its_limit_is_begun_again_from_its_usual_size(monkeypatch, value, chi2, kept):
+    path, begun = "effects.friction.coefficient", []
+    both = Fit(("friction", "base-slip"), 0.0, 1.0, chi2=20.0)
+    both.values, both.at_bound = {path: value, "energy.C10": 500.0}, (path,) if value == 2.0 else ()
+    monkeypatch.setattr(probing_search, "replace", lambda fit, values: begun.append(values) or fit)
+    monkeypatch.setattr(probing_search, "finish", lambda s, keys, start: Fit(keys, 0.0, 1.0, chi2=chi2))
+    bench = SimpleNamespace(
+        free={path: SimpleNamespace(upper=2.0, scale=0.3)},
+        candidates={"friction": SimpleNamespace(amplitudes=(path,)), "base-slip": SimpleNamespace(amplitudes=())},
+    )
+    at = frozenset(both.keys)
+    s = SimpleNamespace(bench=bench, refits={at: both}, report=lambda _: None, criterion=lambda r: r.chi2)
+    assert probing_search.released(s, at) == at
+    assert s.refits[at].chi2 == kept
+    assert begun == ([{path: 0.3, "energy.C10": 500.0}] if value == 2.0 else [])

@@ -76,8 +76,43 @@ def search_probing(bench: ProbingBench, budget: Budget, report: Callable[[str], 
             leave_out(s, best)
         at = best
         if explained(s, s.refits[best]):
-            break
+            return s
+    if len(at) > 1:
+        begin_with_the_second(s, at, budget.nominees[-1])
     return s
+
+
+def begin_with_the_second(s: Search, at: frozenset, most: int) -> None:
+    """The first effect of a pair was chosen while the second was missing, and may have stood in for both.
+
+    So what leaves something is begun again from its second effect alone, and from within where a law has run away.
+    """
+    keys = s.refits[at].keys
+    second = at - {keys[0]}
+    grown = []
+    if second in s.refits and math.isfinite(s.refits[second].chi2):
+        s.report(f"scores beside {keys[1]}, without {keys[0]}")
+        s.score(second)
+        grown = grow(s, second, most)
+    best = min([at, *grown], key=lambda k: s.criterion(s.refits[k]))
+    best = released(s, best)
+    if best != at:
+        leave_out(s, richer(s, best))
+
+
+def released(s: Search, at: frozenset) -> frozenset:
+    """The set refitted with every amplitude that rests on its upper bound begun again from its usual size.
+
+    A friction that nothing slides against has no slope, and what was missing when it ran there has a name now.
+    """
+    r, free = s.refits[at], s.bench.free
+    amplitudes = {p for k in r.keys for p in s.bench.candidates[k].amplitudes}
+    away = {p: free[p].scale for p in amplitudes.intersection(r.at_bound) if r.values[p] >= free[p].upper}
+    if away:
+        s.report(f"{' + '.join(r.keys)}, from within")
+        again = finish(s, r.keys, replace(r, values={**r.values, **away}))
+        s.refits[at] = min(r, again, key=s.criterion)
+    return at
 
 
 def explained(s: Search, r: Refit) -> bool:
@@ -148,6 +183,8 @@ def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
     whole = parent.chi2
     grown: list[frozenset] = []
     for key in asked_outside(s, at):
+        if at | {key} in s.refits:
+            continue
         s.report(f"{' + '.join([*parent.keys, key])}, which the held-out recordings ask for")
         s.refits[at | {key}] = finish(s, (*parent.keys, key), parent)
         grown.append(at | {key})
@@ -156,7 +193,7 @@ def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
         own = any(s.bench.candidates[c].held for k in grown for c in k - at)
         if len(grown) >= most + own:  # they mimic much that is common to all: one rival more is heard
             break
-        if s.names(at | {key}) in [s.names(k) for k in grown]:
+        if at | {key} in s.refits or s.names(at | {key}) in [s.names(k) for k in grown]:
             continue  # forms of one effect are compared in `richer`
         calm = [k for k in grown if quality(s, s.refits[k]).noise or settled(s, s.refits[k])]
         enough = any(not s.bench.candidates[c].held for k in calm for c in k - at)
@@ -178,7 +215,7 @@ def favourite(s: Search, at: frozenset, nominated: list[Score], grown: list[froz
         return []
     parent, best = s.refits[at], nominated[0]
     keys = at | {best.key}
-    if s.names(keys) in [s.names(k) for k in grown]:
+    if keys in s.refits or s.names(keys) in [s.names(k) for k in grown]:
         return []
     s.report(f"{' + '.join([*parent.keys, best.key])}, in shorter steps")
     start = replace(parent, values={**parent.values, **best.setting})
