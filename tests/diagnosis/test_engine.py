@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from spring_bench import spring
 
-from tissuejax.diagnosis.decide import decide, sound, stated
+from tissuejax.diagnosis.decide import FIELD, decide, sound, stated
 from tissuejax.diagnosis.locate import locate
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.refit import refit
@@ -150,6 +150,10 @@ def test_a_set_that_ran_to_its_bound_or_predicts_worse_than_the_base_is_not_soun
     good = s.refits[frozenset({"relax"})]
     assert sound(s, good)
     assert not sound(s, replace(good, at_bound=("relax.g",), values={**good.values, "relax.g": 0.95}))
+    whole = s.bench.candidates["relax"]
+    s.bench.candidates["relax"] = replace(whole, amplitudes=("relax.g", *(f"bell{i}" for i in range(FIELD))))
+    assert sound(s, replace(good, at_bound=("relax.g",), values={**good.values, "relax.g": 0.95})), "one of many"
+    s.bench.candidates["relax"] = whole
     off = replace(good, at_bound=("relax.g",), values={**good.values, "relax.g": 0.0})
     assert sound(s, off)
     assert not sound(s, replace(good, held=2 * s.empty.held))

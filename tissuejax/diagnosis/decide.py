@@ -41,6 +41,7 @@ TEMPER = 4.0
 NAMED, HALF_NAMED, HALF_SLIGHTED = 0.97, 0.12, 300.0
 SLIGHTED = 0.05  # of what the chosen set has gained: what a larger one gains beyond is counted against that, too
 LAW = 0.005  # of the largest measurement: so much any law leaves of real data, and it speaks against no name
+FIELD = 10  # amplitudes of one effect beyond which it is a field of the place
 EVEN = 0.5  # a name that is likelier wrong than right is not given
 STRANGE, HALF_STRANGE = 0.95, 0.3
 NOTHING = 0.95
@@ -143,11 +144,12 @@ def worse(s: Search, r: Refit) -> bool:
 def sound(s: Search, r: Refit) -> bool:
     """Whether r is beyond reproach: no worse than the base on held-out recordings, and no amplitude out of its range.
 
-    A friction as large as it may be is not measured, it has run away.
+    A friction as large as it may be is not measured, it has run away; one of the many amplitudes of a field is let be.
     """
     before, after = excess(s, s.empty)[1], excess(s, r)[1]
     poorer = r.n_held > 0 and after > before + SIGNIFICANT * math.sqrt(2 * r.n_held) and quality(s, r).z_held > 0
-    free, amplitudes = s.bench.free, {p for k in r.keys for p in s.bench.candidates[k].amplitudes}
+    free, chosen = s.bench.free, [s.bench.candidates[k] for k in r.keys]
+    amplitudes = {p for c in chosen if len(c.amplitudes) <= FIELD for p in c.amplitudes}
     return not poorer and not any(r.values[p] >= free[p].upper for p in amplitudes.intersection(r.at_bound))
 
 

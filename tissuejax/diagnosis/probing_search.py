@@ -73,6 +73,7 @@ def search_probing(bench: ProbingBench, budget: Budget, report: Callable[[str], 
         if s.criterion(s.refits[best]) >= s.criterion(parent):
             break
         if len(best) > 1:
+            best = released(s, best)
             leave_out(s, best)
         at = best
         if explained(s, s.refits[best]):
@@ -85,7 +86,7 @@ def search_probing(bench: ProbingBench, budget: Budget, report: Callable[[str], 
 def begin_with_the_second(s: Search, at: frozenset, most: int) -> None:
     """The first effect of a pair was chosen while the second was missing, and may have stood in for both.
 
-    So what leaves something is begun again from its second effect alone, and from within where a law has run away.
+    So what leaves something is begun again from its second effect alone.
     """
     keys = s.refits[at].keys
     second = at - {keys[0]}
@@ -95,9 +96,8 @@ def begin_with_the_second(s: Search, at: frozenset, most: int) -> None:
         s.score(second)
         grown = grow(s, second, most)
     best = min([at, *grown], key=lambda k: s.criterion(s.refits[k]))
-    best = released(s, best)
     if best != at:
-        leave_out(s, richer(s, best))
+        leave_out(s, released(s, richer(s, best)))
 
 
 def released(s: Search, at: frozenset) -> frozenset:

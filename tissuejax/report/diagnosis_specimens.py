@@ -85,7 +85,7 @@ class DiagnosisSpecimens(Plot):
             right.plot(values, y, "o", color=colour, markersize=4)
         right.set_xscale("log")
         low, high = right.get_xlim()
-        ticks = [v for v in (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50) if low <= v <= high]
+        ticks = [v for v in (0.05, 0.1, 0.2, 0.3, 0.5, 1, 2, 3, 5, 7, 10, 20, 30, 50) if low <= v <= high]
         right.set_xticks(ticks, [f"{v:g}" for v in ticks])
         right.minorticks_off()
         for ax in (left, right):
