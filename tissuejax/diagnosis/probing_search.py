@@ -121,13 +121,13 @@ def explained(s: Search, r: Refit) -> bool:
     An effect may call for a finer simulation than the base did: a support that hardly holds lags behind at ten times
     the speed of life, and a lag of the clocks would take that up.
     """
-    if quality(s, r).noise or settled(s, r):
+    if quality(s, r).noise:
         return True
     if r.chi2 > MODEST * r.n:
-        return False
+        return settled(s, r)
     s.report(f"numerical error beside {' + '.join(r.keys)}")
     found = s.bench.numerics[frozenset(r.keys)] = numerics(s.bench, s.misfit, r)
-    return found.enough(r)
+    return settled(s, r) or found.enough(r)
 
 
 def settled(s: Search, r: Refit) -> bool:
