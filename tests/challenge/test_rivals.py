@@ -98,3 +98,25 @@ def test_rivals_are_marked_like_the_diagnosis(tmp_path):
     known = [r for r, key in zip(ratios, keys.values()) if key["category"] != "unknown"]
     assert subsets["held_out_error_over_truth"]["median"] == pytest.approx(np.median(known))
     assert (tmp_path / "rivals.csv").read_text().count("\n") == 7
+
+
+def test_of_probings_the_names_are_compared(tmp_path, monkeypatch):
+    """No Gaussian process over stretch and rate there, and no held-out error pooled over force and markers."""
+    truth = {"r3": {"force": 1.0, "markers": 1.0}}
+    common = {"held_out": "r3", "truth_error_over_noise": truth, "plain": {}, "tolerated": [], "noise": {}}
+    keys = {
+        "p0": common | {"category": "one", "effects": ["adhesion"], "size_over_noise": {"adhesion": 4.0}},
+        "p1": common | {"category": "none", "effects": [], "size_over_noise": {}},
+    }
+    manifest = {"kind": "probing", "cases": [{"name": n, "energy": "reduced-polynomial-2"} for n in keys]}
+    monkeypatch.setattr(files, "read_manifest", lambda folder: manifest)
+    monkeypatch.setattr(files, "read_keys", lambda folder, manifest: keys)
+    for name, key in keys.items():
+        answer = RESULT | {"verdict": "found", "effects": [{"name": n} for n in key["effects"]], "after": {}}
+        write_json(tmp_path / "results" / name / "result.json", answer)
+        write_json(tmp_path / "results" / name / "cost.json", {"seconds": 2.0})
+    found = compare(tmp_path)["rivals"]
+    assert "Gaussian-process discrepancy" not in found
+    assert found["diagnosis"]["single above 3 noise: right and no other"]["share"] == 1.0
+    assert found["score ranking alone"]["single above 3 noise: right and no other"]["share"] == 0.0
+    assert found["score ranking alone"]["nulls: false alarm"]["share"] == 1.0

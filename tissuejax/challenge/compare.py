@@ -35,7 +35,8 @@ def compare(
     """Rates of every rival beside those of the diagnosis; writes rivals.json and rivals.csv.
 
     Args:
-        folder: a challenge of material tests, run at least in part.
+        folder: a challenge, run at least in part. Of probings the rates of names alone are compared: the Gaussian
+            process is one of stretch and rate, and the table of candidates pools the channels.
         out: where to write; the challenge's own folder by default.
         every: a Gaussian process is fitted to each case whose place in the list this divides (seconds a case).
 
@@ -60,9 +61,10 @@ def compare(
             effects, held = ask(result)
             said[name] = _as_result(keys[name], effects, held)
         rows[way] = _rates(keys, said)
-    picked = list(answers)[::every]
-    with (progress or Silent()).stage("Gaussian processes", total=len(picked)) as stage:
-        rows["Gaussian-process discrepancy"] = _processes(folder, keys, energies, picked, stage)
+    picked = [] if manifest["kind"] == "probing" else list(answers)[::every]
+    if picked:
+        with (progress or Silent()).stage("Gaussian processes", total=len(picked)) as stage:
+            rows["Gaussian-process discrepancy"] = _processes(folder, keys, energies, picked, stage)
     found = {"answered": len(answers), "processes": picked, "rivals": rows}
     out = Path(out) if out else folder
     write_json(out / "rivals.json", found)
@@ -72,10 +74,11 @@ def compare(
 
 def _as_result(key: dict, effects: tuple[str, ...], held: float) -> dict:
     """A rival's answer in the form that `mark` reads: it has no other verdicts than these two."""
+    probing = isinstance(key["truth_error_over_noise"][key["held_out"]], dict)
     return {
         "verdict": "found" if effects else "unexplained" if key["category"] == "unknown" else "nothing-missing",
         "effects": [{"name": e} for e in effects],
-        "after": {key["held_out"]: {"nominal_stress": {"chi2_per_sample": held}}},
+        "after": {} if probing else {key["held_out"]: {"nominal_stress": {"chi2_per_sample": held}}},
     }
 
 
