@@ -160,7 +160,7 @@ def test_a_pair_that_leaves_something_is_begun_again_from_its_second_effect(monk
     """a was chosen while b was missing; beside b alone it is c that explains the rest."""
     fits = {k: Fit(tuple(k), 0.0, 1.0, chi2=c) for k, c in {"": 100.0, "a": 40.0, "ab": 20.0, "b": 45.0}.items()}
     refits = {frozenset(k): r for k, r in fits.items()}
-    begun, left_out = [], []
+    begun, left_out, judged = [], [], []
 
     def grow(s, at, most):
         begun.append(at)
@@ -170,6 +170,7 @@ def test_a_pair_that_leaves_something_is_begun_again_from_its_second_effect(monk
     monkeypatch.setattr(probing_search, "grow", grow)
     monkeypatch.setattr(probing_search, "richer", lambda s, at: at)
     monkeypatch.setattr(probing_search, "leave_out", lambda s, at: left_out.append(at))
+    monkeypatch.setattr(probing_search, "explained", lambda s, r: judged.append(r.keys))
     candidates = {k: SimpleNamespace(amplitudes=()) for k in "abc"}
     s = SimpleNamespace(
         refits=refits,
@@ -182,6 +183,7 @@ def test_a_pair_that_leaves_something_is_begun_again_from_its_second_effect(monk
     probing_search.begin_with_the_second(s, frozenset("ab"), 1)
     assert begun == [frozenset("b")]
     assert left_out == [frozenset("bc")]
+    assert judged == [("b", "c")], "its numerical error counts as that of any found set"
 
 
 @pytest.mark.parametrize(("value", "chi2", "kept"), [(2.0, 5.0, 5.0), (2.0, 30.0, 20.0), (1.9, 5.0, 20.0)])

@@ -97,7 +97,9 @@ def begin_with_the_second(s: Search, at: frozenset, most: int) -> None:
         grown = grow(s, second, most)
     best = min([at, *grown], key=lambda k: s.criterion(s.refits[k]))
     if best != at:
-        leave_out(s, released(s, richer(s, best)))
+        best = released(s, richer(s, best))
+        leave_out(s, best)
+        explained(s, s.refits[best])  # what its simulation has wrong must not speak against it
 
 
 def released(s: Search, at: frozenset) -> frozenset:
