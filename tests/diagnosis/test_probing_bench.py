@@ -8,7 +8,7 @@ from tissuejax.diagnosis import probing_free
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_numerics import numerics
-from tissuejax.diagnosis.probing_runs import COARSE
+from tissuejax.diagnosis.probing_runs import COARSE, FINE
 from tissuejax.diagnosis.probing_search import spread
 from tissuejax.diagnosis.refit import refit
 from tissuejax.energies.catalogue import energy
@@ -84,6 +84,24 @@ def test_motion_of_probe_support_and_rig_needs_no_run_of_its_own(bench, path, st
             held = (s.time > 1.2) & (s.time < 1.6)
             true = ((up - down) / (now + step - low))[s.rows][held]
             assert np.linalg.norm(free[s.rows][held] - true) < 0.12 * np.linalg.norm(true)
+
+
+@pytest.mark.parametrize("path", ["energy.C10", "effects.registration.dx"])
+def test_derivatives_can_be_asked_of_the_mesh_that_counts(bench, monkeypatch, path):
+    asked, many = set(), bench.runs.many
+
+    def told(jobs):
+        asked.update(kind for _, _, kind in jobs)
+        return many(jobs)
+
+    monkeypatch.setattr(bench.runs, "many", told)
+    cheap = bench.jacobian(VALUES, (path,))
+    assert asked == {COARSE}
+    asked.clear()
+    monkeypatch.setattr(bench, "slopes", FINE)
+    dear = bench.jacobian(VALUES, (path,))
+    assert asked == {FINE}
+    assert 0 < np.linalg.norm(cheap - dear) < 0.5 * np.linalg.norm(dear)
 
 
 def test_sensors_are_blind_to_each_other(bench):

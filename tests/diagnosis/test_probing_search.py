@@ -126,10 +126,59 @@ def test_the_best_scored_candidate_is_refitted_unless_it_was_or_something_explai
     s = SimpleNamespace(
         refits={frozenset(): parent, frozenset(grown): parent}, report=lambda _: None, names=lambda keys: keys
     )
-    nominated = [SimpleNamespace(key="a", setting={}), SimpleNamespace(key="c", setting={})]
+    nominated = [SimpleNamespace(key=k, gain=10.0, setting={}) for k in "ac"]
     found = probing_search.favourite(s, frozenset(), nominated, [frozenset(grown)])
     assert asked == begun
     assert found == [frozenset(k) for k in begun]
+
+
+@pytest.mark.parametrize(("gain", "begun"), [(8.0, [("x", "c")]), (3.0, [])])
+def test_beside_a_found_effect_the_next_name_of_nearly_as_good_a_score_is_heard(monkeypatch, gain, begun):
+    asked, parent = [], Fit(("x",), 0.0, 1.0)
+    parent.values = {}
+    monkeypatch.setattr(probing_search, "replace", lambda fit, values: fit)
+    monkeypatch.setattr(probing_search, "quality", lambda s, r: SimpleNamespace(noise=False))
+    monkeypatch.setattr(probing_search, "settled", lambda s, r: False)
+    monkeypatch.setattr(probing_search, "finish", lambda s, keys, start: asked.append(keys) or Fit(keys, 0.0, 1.0))
+    refits = {frozenset("x"): parent, frozenset("xa"): parent}  # a was refitted and left something
+    s = SimpleNamespace(refits=refits, report=lambda _: None, names=lambda keys: keys)
+    nominated = [SimpleNamespace(key=k, gain=g, setting={}) for k, g in (("a", 10.0), ("c", gain))]
+    found = probing_search.favourite(s, frozenset("x"), nominated, [frozenset("xa")])
+    assert asked == begun
+    assert found == [frozenset(k) for k in begun]
+
+
+@pytest.mark.parametrize(
+    ("chi2", "noise", "again", "kept"),
+    [
+        (1.004, False, 0.996, 0.996),  # the fitted recordings are met, the next site is not
+        (1.004, False, 1.1, 1.004),
+        (1.004, True, 0.996, 1.004),  # nothing to do
+        (3.0, False, 0.996, 3.0),  # more is missing than a better descent would bring
+    ],
+)
+def test_a_set_that_leaves_little_goes_on_with_derivatives_of_the_mesh_that_counts(
+    monkeypatch, chi2, noise, again, kept
+):
+    bench, seen = SimpleNamespace(slopes=probing_search.COARSE), []
+
+    def finish(s, keys, start, iterations):
+        seen.append(bench.slopes)
+        return Fit(keys, 0.0, 1.0, chi2=again)
+
+    monkeypatch.setattr(probing_search, "finish", finish)
+    monkeypatch.setattr(probing_search, "quality", lambda s, r: SimpleNamespace(noise=noise))
+    at = frozenset(["registration/place"])
+    s = SimpleNamespace(
+        bench=bench,
+        refits={at: Fit(tuple(at), 0.0, 1.0, chi2=chi2)},
+        report=lambda _: None,
+        criterion=lambda r: r.chi2,
+    )
+    assert probing_search.polished(s, at) == at
+    assert s.refits[at].chi2 == kept
+    assert seen == ([probing_search.FINE] if not noise and chi2 < 2 else [])
+    assert bench.slopes == probing_search.COARSE
 
 
 @pytest.mark.parametrize(
@@ -169,6 +218,7 @@ def test_a_pair_that_leaves_something_is_begun_again_from_its_second_effect(monk
 
     monkeypatch.setattr(probing_search, "grow", grow)
     monkeypatch.setattr(probing_search, "richer", lambda s, at: at)
+    monkeypatch.setattr(probing_search, "polished", lambda s, at: at)
     monkeypatch.setattr(probing_search, "leave_out", lambda s, at: left_out.append(at))
     monkeypatch.setattr(probing_search, "explained", lambda s, r: judged.append(r.keys))
     candidates = {k: SimpleNamespace(amplitudes=()) for k in "abc"}

@@ -78,7 +78,7 @@ class ProbingBench(Bench):
         bench.ready, bench.model = ready, model
         bench.finite = kept_samples(sample, segments)
         bench.runs = Runs({FINE: ready, COARSE: ready.with_settings(rough)}, {}, segments, y, bench.finite, keep)
-        bench.kind, bench.shift = FINE, None
+        bench.kind, bench.slopes, bench.shift = FINE, COARSE, None
         bench._declare(names)
         return bench
 
@@ -173,7 +173,7 @@ class ProbingBench(Bench):
                 displaced += probing_free.displaced(self, at, path, wanted)
             elif not probing_free.sensed(self, path):
                 own = tuple(r for r in wanted if r == path.rsplit(".", 1)[-1]) or wanted
-                displaced += [(at, own, COARSE), ({**at, path: at[path] + h}, own, COARSE)]
+                displaced += [(at, own, self.slopes), ({**at, path: at[path] + h}, own, self.slopes)]
         self.runs.many(displaced)  # all at once; what follows finds them
         for i, (at, path, h, wanted) in enumerate(asked):
             if probing_free.moves(self, at, path):
@@ -182,7 +182,7 @@ class ProbingBench(Bench):
                 out[:, i] = probing_free.reported(self, at, path, h, self.predict(at, wanted))
             else:
                 own = tuple(r for r in wanted if r == path.rsplit(".", 1)[-1]) or wanted
-                left = self.runs.many([(at, own, COARSE), ({**at, path: at[path] + h}, own, COARSE)])
+                left = self.runs.many([(at, own, self.slopes), ({**at, path: at[path] + h}, own, self.slopes)])
                 out[:, i] = (left[1] - left[0]) / h
         return out
 

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import equinox as eqx
 import numpy as np
 
-from tissuejax.diagnosis.probing_runs import COARSE
 from tissuejax.diagnosis.probing_series import CHANNELS, filled, picked, put
 from tissuejax.effects.effect import Effect
 from tissuejax.experiments.probing_sensors import smooth_path
@@ -74,7 +73,7 @@ def displaced(bench: "ProbingBench", at: Mapping[str, float], path: str, wanted:
     """The runs that `moving` needs."""
     own = _own(path, wanted)
     axes = [(a, ASIDE[a]) for a in _axes(path)]
-    return [(at, own, COARSE), *((_shifted(at, p, h, own), own, COARSE) for _, (p, h) in axes)]
+    return [(at, own, bench.slopes), *((_shifted(at, p, h, own), own, bench.slopes) for _, (p, h) in axes)]
 
 
 def _shifted(at: Mapping[str, float], path: str, h: float, own: tuple[str, ...]) -> dict[str, float]:
@@ -85,11 +84,11 @@ def _shifted(at: Mapping[str, float], path: str, h: float, own: tuple[str, ...])
 def moving(bench: "ProbingBench", at: Mapping[str, float], path: str, wanted: tuple[str, ...]) -> np.ndarray:
     """Derivative by a parameter that moves probe or support."""
     own = _own(path, wanted)
-    origin = bench.runs.many([(at, own, COARSE)])[0]
+    origin = bench.runs.many([(at, own, bench.slopes)])[0]
     slope = {}
     for axis in _axes(path):
         p, h = ASIDE[axis]
-        shifted = bench.runs.many([(_shifted(at, p, h, own), own, COARSE)])[0]
+        shifted = bench.runs.many([(_shifted(at, p, h, own), own, bench.slopes)])[0]
         slope[axis] = (shifted - origin) / abs(h)  # upwards for z: the depth of a contact offset counts downwards
     out = np.zeros(len(bench.y))
     for r in own:
