@@ -8,8 +8,8 @@ from tissuejax.diagnosis import probing_free
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_numerics import numerics
+from tissuejax.diagnosis.probing_refits import spread
 from tissuejax.diagnosis.probing_runs import COARSE, FINE
-from tissuejax.diagnosis.probing_search import spread
 from tissuejax.diagnosis.refit import refit
 from tissuejax.energies.catalogue import energy
 from tissuejax.recordings.recording import Sample
