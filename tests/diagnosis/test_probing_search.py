@@ -132,3 +132,19 @@ def test_a_pair_that_leaves_something_is_begun_again_from_its_second_effect(monk
     assert begun == [frozenset("b")]
     assert left_out == [frozenset("bc")]
     assert judged == [("b", "c")], "its numerical error counts as that of any found set"
+
+
+@pytest.mark.parametrize(
+    ("chi2", "held", "answer"),
+    [
+        (118.0, 120.0, True),  # 2 % of the base's excess is left, held out 5 %
+        (118.0, 320.0, False),  # the third site misses more than half of what the base missed there
+        (118.0, 128.0, True),  # much of little is little
+        (150.0, 100.0, False),
+    ],
+)
+def test_a_found_effect_is_enough_only_if_the_held_out_recordings_do_not_ask_for_more(chi2, held, answer):
+    base = Fit((), 0.0, 500.0 if held != 128.0 else 150.0, chi2=1100.0, n=100, n_held=100)
+    base.k, r = 0, Fit(("friction",), 0.0, held, chi2=chi2, n=100, n_held=100)
+    r.k = 0
+    assert probing_search.settled(SimpleNamespace(empty=base), r) is answer

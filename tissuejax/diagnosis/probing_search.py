@@ -16,6 +16,7 @@ from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_numerics import numerics
 from tissuejax.diagnosis.probing_refits import (
+    LACKING,
     MODEST,
     finish,
     leave_out,
@@ -127,10 +128,12 @@ def explained(s: Search, r: Refit) -> bool:
 def settled(s: Search, r: Refit) -> bool:
     """Whether what is left is as small as the numerical error of what was found: a further effect would take that up.
 
-    The scores beside an effect cost as much as all before them, and no set is believed for so small a share.
+    The scores beside an effect cost as much as all before them, and no set is believed for so small a share. Unless the
+    held-out recordings ask for more: what hardly shows under two sites may be most of what a third one feels.
     """
     left, whole = r.chi2 - (r.n - r.k), s.empty.chi2 - (s.empty.n - s.empty.k)
-    return left < SETTLED * whole and r.chi2 / r.n < NEARLY
+    missed = r.held - r.n_held > LACKING * (s.empty.held - s.empty.n_held) and r.held > NEARLY * r.n_held
+    return left < SETTLED * whole and r.chi2 / r.n < NEARLY and not missed
 
 
 def leading(s: Search, at: frozenset, grown: list[frozenset]) -> frozenset:
