@@ -43,9 +43,18 @@ def test_held_out_recordings_that_are_missed_far_more_ask_for_values_of_their_ow
     assert probing_search.asked_outside(s, frozenset()) == asked
 
 
-@pytest.mark.parametrize(("noise", "grown", "begun"), [(False, "b", ["a"]), (True, "b", []), (False, "a", [])])
+@pytest.mark.parametrize(
+    ("noise", "grown", "own", "begun"),
+    [
+        (False, "b", "", ["a"]),
+        (True, "b", "", []),  # something explains the rest
+        (False, "a", "", []),  # it was refitted
+        (True, "b", "b", ["a"]),  # what explains the rest has values of its own in every recording, and mimics much
+        (True, "b", "ba", ["c"]),
+    ],
+)
 def test_the_best_scored_candidate_is_refitted_unless_it_was_or_something_explains_the_rest(
-    monkeypatch, noise, grown, begun
+    monkeypatch, noise, grown, own, begun
 ):
     asked = []
     parent = Fit((), 0.0, 1.0)
@@ -55,7 +64,10 @@ def test_the_best_scored_candidate_is_refitted_unless_it_was_or_something_explai
     monkeypatch.setattr(probing_search, "finish", lambda s, keys, start: asked.append(*keys) or Fit(keys, 0.0, 1.0))
     parent.values = {}
     s = SimpleNamespace(
-        refits={frozenset(): parent, frozenset(grown): parent}, report=lambda _: None, names=lambda keys: keys
+        refits={frozenset(): parent, frozenset(grown): parent},
+        report=lambda _: None,
+        names=lambda keys: keys,
+        bench=SimpleNamespace(candidates={k: SimpleNamespace(held=("x",) if k in own else ()) for k in "abc"}),
     )
     nominated = [SimpleNamespace(key=k, gain=10.0, setting={}) for k in "ac"]
     found = probing_search.favourite(s, frozenset(), nominated, [frozenset(grown)])
@@ -72,7 +84,10 @@ def test_beside_a_found_effect_the_next_name_of_nearly_as_good_a_score_is_heard(
     monkeypatch.setattr(probing_search, "settled", lambda s, r: False)
     monkeypatch.setattr(probing_search, "finish", lambda s, keys, start: asked.append(keys) or Fit(keys, 0.0, 1.0))
     refits = {frozenset("x"): parent, frozenset("xa"): parent}  # a was refitted and left something
-    s = SimpleNamespace(refits=refits, report=lambda _: None, names=lambda keys: keys)
+    candidates = {k: SimpleNamespace(held=()) for k in "xac"}
+    s = SimpleNamespace(
+        refits=refits, report=lambda _: None, names=lambda keys: keys, bench=SimpleNamespace(candidates=candidates)
+    )
     nominated = [SimpleNamespace(key=k, gain=g, setting={}) for k, g in (("a", 10.0), ("c", gain))]
     found = probing_search.favourite(s, frozenset("x"), nominated, [frozenset("xa")])
     assert asked == begun

@@ -210,13 +210,15 @@ def favourite(s: Search, at: frozenset, nominated: list[Score], grown: list[froz
 
     The step may have led too far (a support nearly free), or the cheap mesh may not bear it (a probe set aside by less
     than one of its elements). Beside a found effect, where a right second one should leave nothing, the next name whose
-    score is nearly as good is heard, too.
+    score is nearly as good is heard, too; and where only values of their own in every recording explain the rest, since
+    they mimic much, one that is common to all.
     """
-    explained = any(quality(s, s.refits[k]).noise or settled(s, s.refits[k]) for k in grown)
-    if explained or not nominated:
+    calm = [k for k in grown if quality(s, s.refits[k]).noise or settled(s, s.refits[k])]
+    if not nominated or any(not s.bench.candidates[c].held for k in calm for c in k - at):
         return []
     parent, known = s.refits[at], [s.names(k) for k in grown]
-    heard = [n for n in nominated if n.gain > MOSTLY * nominated[0].gain] if at else nominated[:1]
+    heard = [n for n in nominated if n.gain > MOSTLY * nominated[0].gain] if at or calm else nominated[:1]
+    heard = [n for n in heard if not (calm and s.bench.candidates[n.key].held)]
     best = next((n for n in heard if s.names(at | {n.key}) not in known and at | {n.key} not in s.refits), None)
     if best is None:
         return []
