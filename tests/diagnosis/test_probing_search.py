@@ -62,6 +62,7 @@ def test_the_best_scored_candidate_is_refitted_unless_it_was_or_something_explai
     monkeypatch.setattr(probing_search, "quality", lambda s, r: SimpleNamespace(noise=noise))
     monkeypatch.setattr(probing_search, "settled", lambda s, r: False)
     monkeypatch.setattr(probing_search, "finish", lambda s, keys, start: asked.append(*keys) or Fit(keys, 0.0, 1.0))
+    monkeypatch.setattr(probing_search, "polished", lambda s, at: at)
     parent.values = {}
     s = SimpleNamespace(
         refits={frozenset(): parent, frozenset(grown): parent},
@@ -92,6 +93,28 @@ def test_beside_a_found_effect_the_next_name_of_nearly_as_good_a_score_is_heard(
     found = probing_search.favourite(s, frozenset("x"), nominated, [frozenset("xa")])
     assert asked == begun
     assert found == [frozenset(k) for k in begun]
+
+
+def test_after_offsets_of_every_recording_an_effect_common_to_all_is_heard(monkeypatch):
+    """a explains the rest with values of its own in every recording; c, common to all, does so too."""
+    asked, further, parent = [], [], Fit(("x",), 0.0, 1.0)
+    parent.values = {}
+    monkeypatch.setattr(probing_search, "replace", lambda fit, values: fit)
+    monkeypatch.setattr(probing_search, "polished", lambda s, at: further.append(at))
+    monkeypatch.setattr(probing_search, "quality", lambda s, r: SimpleNamespace(noise=len(r.keys) > 1))
+    monkeypatch.setattr(probing_search, "settled", lambda s, r: False)
+    monkeypatch.setattr(probing_search, "finish", lambda s, keys, start: asked.append(keys) or Fit(keys, 0.0, 1.0))
+    candidates = {k: SimpleNamespace(held=("own",) if k in "ab" else ()) for k in "xabcd"}
+    s = SimpleNamespace(
+        refits={frozenset("x"): parent},
+        report=lambda _: None,
+        names=lambda keys: keys,
+        bench=SimpleNamespace(candidates=candidates),
+    )
+    nominated = [SimpleNamespace(key=k, gain=10.0, setting={}) for k in "abcd"]
+    assert probing_search.favourite(s, frozenset("x"), nominated, []) == [frozenset("xa"), frozenset("xc")]
+    assert asked == [("x", "a"), ("x", "c")]
+    assert further == [frozenset("xc")], "it goes on to the end before the two are compared"
 
 
 @pytest.mark.parametrize(

@@ -212,10 +212,7 @@ def decide(s: Search) -> Verdict:
             rivals = tuple(
                 s.refits[k]
                 for k in best_of_each(s)
-                if k
-                and len(k) <= len(chosen.keys)
-                and s.names(k) != mine
-                and s.criterion(s.refits[k]) < s.criterion(chosen) + close(s, chosen)
+                if k and len(k) <= len(chosen.keys) and s.names(k) != mine and rivals_with(s, chosen, s.refits[k])
             )
             kind = "ambiguous" if rivals else "found"
     if s.bench.dear:
@@ -247,6 +244,17 @@ def too_little(s: Search, chosen: Refit, after: Quality, e0: tuple, e1: tuple) -
     twice = 2 * (LEFT if s.bench.dear else left)
     outside = 1 - e1[1] / e0[1] if e0[1] > 0 else 1.0
     return bool(s.bench.held_out) and outside < 1 - twice and after.z_held > SIGNIFICANT
+
+
+def rivals_with(s: Search, chosen: Refit, other: Refit) -> bool:
+    """Whether another set can't be told from the chosen one.
+
+    Their criteria are near, or the chosen one owes its lead to values that held-out probings have for themselves: a set
+    without such values that is better on the fitted ones may be the truth, not yet followed to its end.
+    """
+    if s.criterion(other) < s.criterion(chosen) + close(s, chosen):
+        return True
+    return s.bench.dear and bool(chosen.own) and not other.own and s.fitted(other) < s.fitted(chosen)
 
 
 def close(s: Search, chosen: Refit) -> float:

@@ -106,7 +106,7 @@ def polished(s: Search, at: frozenset) -> frozenset:
         s.report(f"{' + '.join(r.keys)}, by the finer mesh alone")
         s.bench.slopes = FINE
         try:
-            s.refits[at] = min(r, finish(s, r.keys, r, BRIEF), key=s.criterion)
+            s.refits[at] = min(r, finish(s, r.keys, r), key=s.criterion)
         finally:
             s.bench.slopes = COARSE
     return at

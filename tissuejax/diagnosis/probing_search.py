@@ -225,8 +225,11 @@ def favourite(s: Search, at: frozenset, nominated: list[Score], grown: list[froz
     keys = at | {best.key}
     s.report(f"{' + '.join([*parent.keys, best.key])}, in shorter steps")
     start = replace(parent, values={**parent.values, **best.setting})
-    s.refits[keys] = finish(s, (*parent.keys, best.key), start)
-    return [keys]
+    done = s.refits[keys] = finish(s, (*parent.keys, best.key), start)
+    if calm:
+        polished(s, keys)  # offsets fit at once what a place finds at the end of a long valley
+    mimic = s.bench.candidates[best.key].held and (quality(s, done).noise or settled(s, done))
+    return [keys, *(favourite(s, at, nominated, [*grown, keys]) if mimic else [])]
 
 
 def nominees(s: Search, at: frozenset) -> list[Score]:
