@@ -17,7 +17,8 @@ from tissuejax.diagnosis.score import Score
 from tissuejax.diagnosis.search import ALLOWED, Search
 
 MODEST = 2.0  # chi-square per sample above which no simulation is as wrong as that, nor a descent stuck as high
-BRIEF, LACKING = 3, 0.25  # iterations without one effect, and the share of what was missing that makes it needed
+# iterations without one effect; the share of what was missing (fitted, or held out) from which on more is needed
+BRIEF, LACKING = 3, 0.25
 ELSEWHERE = 0.5  # of the best place's gain: the least for an inclusion to be tried under another site
 
 

@@ -40,7 +40,9 @@ RIVALS = 0.3  # of the best step's gain: the least for a refit; a step from far 
 SETTLED, NEARLY = 0.03, 1.3  # share of the base's excess, and chi-square per sample, that a found effect may leave
 CLOSE = 0.85  # the same, once one refit leaves nothing but noise
 OUTSIDE = 3.0  # times the misfit of the fitted recordings: from there on the held-out ones are asked what they lack
-MOSTLY = 0.5  # share of the held-out misfit that own values must take up, and that a leading set must explain
+# share of the held-out misfit that own values must take up, and that a leading set must explain; of the best score,
+# the least for a name to be heard although its step did not do well
+MOSTLY = 0.5
 
 
 def search_probing(bench: ProbingBench, budget: Budget, report: Callable[[str], None] = lambda _: None) -> Search:
