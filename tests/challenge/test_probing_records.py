@@ -8,7 +8,7 @@ from tissuejax.challenge.lobe import Lobe
 from tissuejax.challenge.material import Ingredient
 from tissuejax.challenge.probe_paths import Path, over
 from tissuejax.challenge.probing_bench import record
-from tissuejax.challenge.probing_menu import CATALOGUED
+from tissuejax.challenge.probing_menu import CATALOGUED, LOUD
 from tissuejax.challenge.solid import Tissue
 
 LOBE = Lobe(0.03, 0.027, 0.09, 0.02, 0.5, 0.9, (0.0, 0.0))
@@ -68,3 +68,9 @@ def test_a_strong_challenge_has_every_effect_once_and_the_stronger_draws(rng):
             for draws in (1, probing_cases.STRONG)
         )
         assert strong > weak, course.name
+
+
+def test_pairs_that_can_be_seen_take_turns_and_never_mix_histories(rng):
+    drawn = [probing_cases.courses(rng, "two", i, LOUD) for i in range(2 * len(LOUD))]
+    assert [first.name for first, _ in drawn] == 2 * [c.name for c in LOUD]
+    assert all(a.name != b.name and b in LOUD and not (a.history and b.history) for a, b in drawn)

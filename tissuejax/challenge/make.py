@@ -23,6 +23,7 @@ def make(
     jobs: int = 1,
     progress: Progress | None = None,
     strong: bool = False,
+    pairs: bool = False,
 ) -> dict:
     """Make `count` cases and return the manifest.
 
@@ -37,28 +38,32 @@ def make(
         jobs: processes.
         progress: told after every case.
         strong: probings with strong effects only, one or two of them: how often is right what can be seen?
+        pairs: probings with two effects each, both of those that can be seen at all, at the upper end of their range.
 
     Raises:
-        InputError: unknown kind, strong material tests, a count below one, or a folder that holds another challenge
-            already.
+        InputError: unknown kind, strong material tests or pairs of them alone, both of these at once, a count below
+            one, or a folder that holds another challenge already.
     """
     out = Path(out)
     if kind not in KINDS:
         raise unknown("kind of challenge", kind, KINDS)
     if count < 1 or jobs < 1:
         raise InputError(f"count {count}, jobs {jobs}: both must be 1 or more")
-    if strong and kind != "probing":
-        raise InputError("strong cases are made of probings only; leave --strong out, or take --kind probing")
-    plan = {"version": 1, "kind": kind, "count": count, "seed": seed, "strong": strong}
+    if strong and pairs:
+        raise InputError("--strong has pairs among its cases already; give it or --pairs")
+    if (strong or pairs) and kind != "probing":
+        raise InputError("strong cases are made of probings only; leave --strong, --pairs out, or take --kind probing")
+    which = {"strong": strong, "pairs": pairs}
+    plan = {"version": 1, "kind": kind, "count": count, "seed": seed} | which
     if (out / "manifest.json").exists():
-        manifest = {"strong": False} | files.read_manifest(out)
+        manifest = {"strong": False, "pairs": False} | files.read_manifest(out)
         if {k: manifest[k] for k in plan} == plan:
             return manifest
         if {k: manifest[k] for k in plan if k != "count"} != {k: v for k, v in plan.items() if k != "count"}:
             raise InputError(f"{out} holds another challenge already; name an empty folder, or remove that one")
         if manifest["count"] > count:
             raise InputError(f"{out} holds {manifest['count']} cases of this seed already; ask for as many or more")
-    case = partial(_material, out, seed) if kind == "material" else partial(_probing, out, seed, strong)
+    case = partial(_material, out, seed) if kind == "material" else partial(_probing, out, seed, which)
     entries, keys = {}, {}
     with (progress or Silent()).stage(f"making {count} {kind} cases", total=count) as stage:
         for name, energy, key in _each(case, count, jobs):
@@ -89,14 +94,14 @@ def _material(out: Path, seed: int, index: int) -> tuple[str, str, dict]:
     return name, case.energy, case.key
 
 
-def _probing(out: Path, seed: int, strong: bool, index: int) -> tuple[str, str, dict]:
+def _probing(out: Path, seed: int, which: dict[str, bool], index: int) -> tuple[str, str, dict]:
     from tissuejax.challenge import probing_cases
 
     name = f"p{index:03d}"
     kept = out / "sealed" / "parts" / f"{name}.json"
     path = out / "cases" / f"{name}.h5"
     if not (kept.exists() and path.exists()):  # minutes each: what an interrupted run made is kept
-        case = probing_cases.draw(name, seed, index, strong=strong)
+        case = probing_cases.draw(name, seed, index, **which)
         probing_cases.write(case, path)
         write_json(kept, {"energy": case.energy, "key": case.key})
     part = json.loads(kept.read_text())

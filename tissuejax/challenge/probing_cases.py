@@ -12,7 +12,7 @@ from tissuejax.challenge.material import Ingredient
 from tissuejax.challenge.material_cases import correlated
 from tissuejax.challenge.probe_paths import draw as draw_path
 from tissuejax.challenge.probing_bench import MESH, Record, record
-from tissuejax.challenge.probing_menu import CATALOGUED, STRAY, Course
+from tissuejax.challenge.probing_menu import CATALOGUED, LOUD, STRAY, Course
 from tissuejax.challenge.solid import Tissue
 from tissuejax.errors import NotConverged
 from tissuejax.storage import replacing
@@ -40,7 +40,7 @@ def category(index: int) -> str:
     return CATEGORIES[int(np.searchsorted(np.cumsum(SHARES), grid, side="right"))]
 
 
-STRONG = 3  # draws of which a strong case takes the strongest
+STRONG, LOUDEST = 3, 8  # draws of which a strong case takes the strongest, and a pair that should be seen
 
 
 def strong_category(index: int) -> tuple[str, int]:
@@ -49,19 +49,19 @@ def strong_category(index: int) -> tuple[str, int]:
     return ("one", 2 * block + place) if place < 2 else ("two", 5 * block)
 
 
-def courses(rng: np.random.Generator, kind: str, turn: int) -> list[Course]:
+def courses(rng: np.random.Generator, kind: str, turn: int, menu: tuple[Course, ...] = CATALOGUED) -> list[Course]:
     """Effects of a case; single ones take their turn."""
     if kind == "none":
         return []
     if kind == "unknown":
         return [STRAY[turn % len(STRAY)]]
-    first = CATALOGUED[turn % len(CATALOGUED)]
+    first = menu[turn % len(menu)]
     if kind == "one":
         return [first]
     alike = {"friction": ("adhesion",), "contact-offset": ("machine-compliance",), "base-slip": ("capsule",)}
     others = [
         c
-        for c in CATALOGUED
+        for c in menu
         if c.name != first.name and c.name not in alike.get(first.name, ()) and not (first.history and c.history)
     ]
     return [first, others[int(rng.integers(len(others)))]]
@@ -98,27 +98,39 @@ def draw(
     turn: int | None = None,
     mesh: tuple[int, int, int] = MESH,
     strong: bool = False,
+    pairs: bool = False,
 ) -> Probing:
     """The case with this seed and number (minutes of one core); redrawn if a body finds no equilibrium."""
+    menu, draws = (LOUD, LOUDEST) if pairs else (CATALOGUED, STRONG if strong else 1)
     if strong:
         kind, turn = strong_category(index)
+    if pairs:
+        kind, turn = "two", index
     with threadpool_limits(1):
         for attempt in range(6):
             rng = np.random.default_rng([seed, index, attempt, 2])
             try:
                 kind, turn = kind or category(index), index if turn is None else turn
-                return _draw(name, rng, kind, turn, mesh, STRONG if strong else 1)
+                return _draw(name, rng, kind, turn, mesh, menu, draws)
             except NotConverged:
                 continue
     raise NotConverged(f"probing case {name}: no equilibrium in 6 draws; choose another seed")
 
 
-def _draw(name: str, rng: np.random.Generator, kind: str, turn: int, mesh: tuple[int, int, int], draws: int) -> Probing:
+def _draw(
+    name: str,
+    rng: np.random.Generator,
+    kind: str,
+    turn: int,
+    mesh: tuple[int, int, int],
+    menu: tuple[Course, ...],
+    draws: int,
+) -> Probing:
     lobe = body(rng)
     C10 = float(np.exp(rng.uniform(np.log(400), np.log(1000))))
     tissue = Tissue(C10, C10 * float(rng.uniform(0.3, 1.1)), float(np.exp(rng.uniform(np.log(1.8e4), np.log(4.2e4)))))
     radius = float(rng.choice([0.0095, 0.0095, 0.0095, 0.00625]))
-    added = [c.ingredient(rng, C10, draws) for c in courses(rng, kind, turn)]
+    added = [c.ingredient(rng, C10, draws) for c in courses(rng, kind, turn, menu)]
     sites = [(x + rng.uniform(-1.5e-3, 1.5e-3), y + rng.uniform(-1.5e-3, 1.5e-3)) for x, y in rng.permutation(SITES)]
     styles = [str(s) for s in rng.permutation(["side", "twice", "once"])]
     if rng.random() < 0.3:

@@ -46,6 +46,9 @@ says what simpler ways of answering would have said on the same cases.
             action="store_true",
             help="make: probings with one or two strong effects, no nulls, no strangers",
         )
+        parser.add_argument(
+            "--pairs", action="store_true", help="make: probings with two effects each, strong ones that can be seen"
+        )
         parser.add_argument("--jobs", "-j", type=int, default=1, metavar="N", help="make, run: processes (default 1)")
         parser.add_argument("--case", action="append", default=[], metavar="NAME", help="run: only this case (repeat)")
         parser.add_argument("--again", action="store_true", help="run: diagnose again what has a result")
@@ -54,7 +57,8 @@ says what simpler ways of answering would have said on the same cases.
     def run(self, given: argparse.Namespace) -> Reply:
         """Do one of the four."""
         if given.action == "make":
-            made = make(given.folder, given.kind, given.count, given.seed, given.jobs, for_terminal(), given.strong)
+            which = {"strong": given.strong, "pairs": given.pairs}
+            made = make(given.folder, given.kind, given.count, given.seed, given.jobs, for_terminal(), **which)
             text = (
                 f"{len(made['cases'])} {given.kind} cases in {given.folder}\nkeys sealed, sha256 {made['keys_sha256']}"
             )
