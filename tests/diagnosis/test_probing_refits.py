@@ -81,7 +81,8 @@ def test_a_set_that_leaves_little_goes_on_with_derivatives_of_the_mesh_that_coun
 ):
     bench, seen = SimpleNamespace(slopes=probing_refits.COARSE), []
 
-    def finish(s, keys, start):
+    def finish(s, keys, start, exact):
+        assert exact
         seen.append(bench.slopes)
         return Fit(keys, 0.0, 1.0, chi2=again)
 

@@ -252,17 +252,22 @@ def rivals_with(s: Search, chosen: Refit, other: Refit) -> bool:
     Their criteria are near, or the chosen one owes its lead to values that held-out probings have for themselves: a set
     without such values that is better on the fitted ones may be the truth, not yet followed to its end.
     """
-    if s.criterion(other) < s.criterion(chosen) + close(s, chosen):
+    if s.criterion(other) < s.criterion(chosen) + close(s, chosen, other):
         return True
     return s.bench.dear and bool(chosen.own) and not other.own and s.fitted(other) < s.fitted(chosen)
 
 
-def close(s: Search, chosen: Refit) -> float:
+def close(s: Search, chosen: Refit, other: Refit) -> float:
     """How near another set's criterion may come before the data can't tell it from the chosen one.
 
     Of simulations, a share of what was explained: their error is no random number that more samples would average out.
+    What both sets have in common explains nothing between them: a second name is measured by what the first one left.
     """
-    return max(CLOSE, CLOSE_DEAR * (s.criterion(s.empty) - s.criterion(chosen))) if s.bench.dear else CLOSE
+    if not s.bench.dear:
+        return CLOSE
+    shared = s.names(frozenset(chosen.keys)) & s.names(frozenset(other.keys))
+    before = min((s.criterion(r) for k, r in s.refits.items() if s.names(k) == shared), default=s.criterion(s.empty))
+    return max(CLOSE, CLOSE_DEAR * (before - s.criterion(chosen)))
 
 
 def stated(s: Search, kind: str, chosen: Refit, noise: bool, before: tuple, after: tuple, rivals: tuple = ()) -> float:

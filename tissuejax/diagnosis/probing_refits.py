@@ -39,11 +39,11 @@ def step(s: Search, parent: Refit, score: Score) -> Refit:
         bench.kind, bench.shift = FINE, None
 
 
-def finish(s: Search, keys: tuple[str, ...], start: Refit, iterations: int | None = None) -> Refit:
+def finish(s: Search, keys: tuple[str, ...], start: Refit, iterations: int | None = None, exact: bool = False) -> Refit:
     """A refit to the end (or so many iterations), from where a trial or another form came to."""
     values = {**start.values, **start.own}
     iterations = iterations or s.budget.iterations
-    return refit(s.bench, s.misfit, keys, values, iterations=iterations, tolerance=s.budget.tolerance)
+    return refit(s.bench, s.misfit, keys, values, iterations=iterations, tolerance=s.budget.tolerance, exact=exact)
 
 
 def under_another_site(s: Search, parent: Refit, score: Score, found: Refit) -> Refit:
@@ -107,7 +107,7 @@ def polished(s: Search, at: frozenset) -> frozenset:
         s.report(f"{' + '.join(r.keys)}, by the finer mesh alone")
         s.bench.slopes = FINE
         try:
-            s.refits[at] = min(r, finish(s, r.keys, r), key=s.criterion)
+            s.refits[at] = min(r, finish(s, r.keys, r, exact=True), key=s.criterion)
         finally:
             s.bench.slopes = COARSE
     return at

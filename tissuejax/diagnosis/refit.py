@@ -20,6 +20,8 @@ NOTHING = 1e-5  # of the largest effect of a parameter, each moved by its scale:
 FREE = 1e-4  # damping below which a step of a true Jacobian that gains nothing is the end
 TURN = 0.8  # rad: the longest step of an angle, a quarter of it after every step that gained nothing
 ENOUGH = 2e-3  # of chi-square: where a prediction is a simulation, a step that promises less is not taken
+FURTHER = 3  # times that a step is lengthened
+EXACT = 0.1  # of all that ends a descent, where it has to find the end of a valley
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ class Descent:
     paths: tuple[str, ...]
     recordings: tuple[str, ...]
     rest: dict[str, float]
+    exact: bool = False
 
     def __post_init__(self):
         free = [self.bench.free[p] for p in self.paths]
@@ -131,6 +134,7 @@ class Descent:
         # a Jacobian from elsewhere may lack what vanishes there (shapes at zero amplitude): good for one step
         damping, small, age, given, first = 1e-3, 0, 0, jac is not None, True
         dear = self.bench.dear
+        tolerance *= EXACT if self.exact else 1.0
         for _ in range(iterations):
             if not np.isfinite(cost):
                 return x, cost, prediction, False
@@ -157,7 +161,7 @@ class Descent:
                 step = trial - x
                 left = r - jac @ step
                 promised = cost - float(left @ left)
-                if dear and promised < max(tolerance, ENOUGH * cost):
+                if dear and promised < max(tolerance, (EXACT if self.exact else 1.0) * ENOUGH * cost):
                     return x, cost, prediction, True
                 new, r_new, p_new = self.objective(trial)
                 if new < cost or age > 0:
@@ -171,6 +175,10 @@ class Descent:
                 jac = None
                 continue
             drop = cost - new
+            if self.exact and drop > promised:
+                trial, new, r_new, p_new = self.longer(x, trial, (new, r_new, p_new), tolerance)
+                step, drop = trial - x, cost - new
+                left = r - jac @ step
             true = (age == 0 and not lacking) or dear
             if drop > 0.7 * promised and age < 3 and step @ step > 0 and not lacking:
                 jac, age = jac + np.outer(left - r_new, step) / (step @ step), age + 1
@@ -186,6 +194,22 @@ class Descent:
             if small >= 2 or drop < 1e-3 * tolerance or (tiny and not dear and damping < FREE):
                 return x, cost, prediction, True
         return x, cost, prediction, False
+
+    def longer(
+        self, x: np.ndarray, trial: np.ndarray, found: tuple[float, np.ndarray, np.ndarray], tolerance: float
+    ) -> tuple[np.ndarray, float, np.ndarray, np.ndarray]:
+        """From the step x to trial on in the same direction, twice as far each time, as long as that gains.
+
+        Along a valley one-sided differences of simulations see a steeper wall than there is.
+        """
+        step = trial - x
+        for _ in range(FURTHER):
+            further = np.clip(trial + step, self.low, self.high)
+            more = self.objective(further)
+            if not more[0] < found[0] - tolerance:
+                break
+            trial, found, step = further, more, 2 * step
+        return trial, *found
 
     def errors(self, x: np.ndarray, r: np.ndarray) -> tuple[dict[str, float], tuple[str, ...]]:
         """Standard errors in natural coordinates (scaled up by an honest misfit), and the paths on a bound."""
@@ -226,6 +250,7 @@ def refit(
     final: bool = True,
     errors: bool = True,
     seed: np.ndarray | None = None,
+    exact: bool = False,
 ) -> Refit:
     """Fit base and candidates `keys` from `start` (absent paths start at the bench's neutral values).
 
@@ -234,10 +259,11 @@ def refit(
         final: False leaves standard errors and held-out recordings out, for trial starts.
         errors: False leaves standard errors out.
         seed: the whitened Jacobian at the start (natural coordinates, without priors) where it is known.
+        exact: to the end of a flat valley: smaller gains count, and a step that gained more than it promised goes on.
     """
     whole = {**bench.start, **start}
     paths = tuple(dict.fromkeys([*bench.base, *(p for key in keys for p in bench.candidates[key].paths)]))
-    descent = Descent(bench, misfit, paths, bench.fitted, {})
+    descent = Descent(bench, misfit, paths, bench.fitted, {}, exact)
     first = descent.point(whole)
     known = None if seed is None else descent.scaled(seed, first)
     x, cost, prediction, converged = descent.run(first, iterations, tolerance, known)
@@ -249,7 +275,7 @@ def refit(
         std, at_bound = descent.errors(x, r) if errors else ({}, ())
         belong = tuple(p for key in keys for p in bench.candidates[key].held)
         if belong and bench.held_out:
-            second = Descent(bench, misfit, belong, bench.held_out, values)
+            second = Descent(bench, misfit, belong, bench.held_out, values, exact)
             y, *_ = second.run(second.point(whole), iterations, tolerance)
             own = second.natural(y)
         prediction = bench.predict({**values, **own})

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.tled import capsule, contact, internal, stable, support
+from tissuejax.tled.glide import Glide, glide, spurred
 from tissuejax.tled.internal import barrier
 from tissuejax.tled.scene import Scene
 
@@ -25,6 +26,7 @@ class Machine(NamedTuple):
     skin: capsule.Skin | None
     mass: Float[Array, " N"]
     weight: Float[Array, "3 N"] | None
+    glide: Glide | None
 
 
 class State(NamedTuple):
@@ -69,7 +71,9 @@ def machine(scene: Scene) -> Machine:
     weight = None if scene.gravity is None else scene.gravity[:, None] * mesh.mass
     skin = None if scene.tissue.capsule is None else capsule.skin(scene.body)
     patch = None if probe is None else contact.patch(scene)
-    return Machine(scene, mesh, support.hold(scene, stiffness), patch, skin, mass, weight)
+    hold = support.hold(scene, stiffness)
+    slides = None if scene.support.compliance is None else glide(scene, mass, hold.area)
+    return Machine(scene, mesh, hold, patch, skin, mass, weight, slides)
 
 
 def start(m: Machine) -> State:
@@ -87,7 +91,9 @@ def start(m: Machine) -> State:
         u = u + place[:, :1]
         v = v + (place[:, 1:] - place[:, :1]) / clock.step
     if m.weight is not None and scene.body.settled is None:
-        v = jnp.where(m.hold.held, 0.0, -0.5 * scene.clock.step * m.weight / m.mass)
+        zero = jnp.zeros_like(scene.body.held.T[:2])
+        pull = m.weight if m.glide is None else spurred(scene, m.glide, m.weight, zero, m.hold.area, m.mass)
+        v = jnp.where(m.hold.held, 0.0, -0.5 * scene.clock.step * pull / m.mass)
     grip = None if scene.probe is None else contact.untouched(scene.probe)
     compliant = scene.probe is not None and scene.probe.compliance is not None
     felt = jnp.zeros(3, u.dtype) if compliant else None
@@ -124,10 +130,11 @@ def advance(m: Machine, state: State, drive: Drive) -> tuple[State, Felt]:
         felt = None if felt is None else felt + FEEL * (force - felt)
     f = outer - inner
     half = 0.5 * settings.mass_damping * h
-    driven = (1.0 - half) * v + h * f / m.mass
+    moving = f if m.glide is None else spurred(scene, m.glide, f, state.slip.elastic, m.hold.area, m.mass)
+    driven = (1.0 - half) * v + h * moving / m.mass
     driven = driven if drive.pace is None else driven + 2.0 * half * drive.pace[:, None]
     pushed = driven / (1.0 + half)
-    slip = support.slide(scene, m.hold, state.slip, f, m.mass) if support.slips(scene) else state.slip
+    slip = support.slide(scene, m.hold, state.slip, f, moving, m.mass) if support.slips(scene) else state.slip
     moved = u + h * pushed
     moved = jnp.where(m.hold.held, support.target(scene, m.hold, slip, drive.motion), moved)
     pushed = jnp.where(m.hold.held, (moved - u) / h, pushed)

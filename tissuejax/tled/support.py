@@ -67,25 +67,31 @@ def bonded(scene: Scene) -> Slip:
     return Slip(gives, None if support.fluidity is None else zero, gives)
 
 
-def slide(scene: Scene, hold: Hold, slip: Slip, f: Float[Array, "3 N"], mass: Float[Array, " N"]) -> Slip:
-    """Slip one step later under the net internal and external force f on the tissue, N; `mass` of the nodes, kg.
+def slide(
+    scene: Scene, hold: Hold, slip: Slip, f: Float[Array, "3 N"], moving: Float[Array, "3 N"], mass: Float[Array, " N"]
+) -> Slip:
+    """Slip one step later; `mass` of the nodes, kg.
 
     Elastic, with spring k = area / c, step h and mass damping a: v <- (c ((1 - a h/2) m v + h f) - h area s) /
     (c (1 + a h/2) m + h^2 area), s <- s + h v; at c = 0 nothing moves.
+
+    Args:
+        f: net internal and external force on the tissue, N: what creeps follows it.
+        moving: the same with what makes up for the body's inertia (`glide`): what has mass follows that.
     """
     support, clock = scene.support, scene.clock
     h, half = clock.step, 0.5 * scene.settings.mass_damping * clock.step
     bare = hold.area <= 0
     area = jnp.where(bare, 1.0, hold.area)
-    traction = jnp.where(bare, 0.0, f[:2, scene.body.fixed] / area)
-    stiffness = hold.pull / area  # Pa/m, an upper estimate: what the tissue gives back per slip
     elastic, viscous, speed = slip
     if elastic is not None:
         m, c = mass[scene.body.fixed], support.compliance
-        push = c * ((1.0 - half) * m * speed + h * area * traction) - h * area * elastic
+        push = c * ((1.0 - half) * m * speed + h * moving[:2, scene.body.fixed]) - h * area * elastic
         speed = jnp.where(bare, 0.0, push / (c * (1.0 + half) * m + h * h * area))
         elastic = elastic + h * speed
     if viscous is not None:
+        traction = jnp.where(bare, 0.0, f[:2, scene.body.fixed] / area)
+        stiffness = hold.pull / area  # Pa/m, an upper estimate: what the tissue gives back per slip
         creep = support.fluidity * h * clock.compression
         viscous = viscous + creep * traction / (1.0 + creep * stiffness)
     return Slip(elastic, viscous, speed)
