@@ -117,3 +117,27 @@ def test_an_amplitude_that_ran_to_its_limit_is_begun_again_from_its_usual_size(m
     assert probing_refits.released(s, at) == at
     assert s.refits[at].chi2 == kept
     assert begun == ([{path: 0.3, "energy.C10": 500.0}] if value == 2.0 else [])
+
+
+@pytest.mark.parametrize(
+    ("C10", "chi2", "again", "kept"),
+    [
+        (30.0, 16.0, 2.0, 2.0),  # soft as nothing, since the base that slips was held
+        (30.0, 16.0, 20.0, 16.0),
+        (300.0, 16.0, 2.0, 16.0),  # not astray
+        (30.0, 1.5, 0.9, 1.5),  # nothing worth it is left
+    ],
+)
+def test_a_base_gone_astray_is_begun_again_from_its_start(monkeypatch, C10, chi2, again, kept):
+    begun = []
+    monkeypatch.setattr(probing_refits, "replace", lambda fit, values: begun.append(values) or fit)
+    monkeypatch.setattr(probing_refits, "finish", lambda s, keys, start: Fit(keys, 0.0, 1.0, chi2=again))
+    found = Fit(("base-slip",), 0.0, 1.0, chi2=chi2)
+    found.values = {"energy.C10": C10, "effects.base-slip.compliance": 3e-5}
+    bench = SimpleNamespace(
+        base=("energy.C10",), start={"energy.C10": 400.0}, free={"energy.C10": SimpleNamespace(log=True)}
+    )
+    s = SimpleNamespace(bench=bench, report=lambda _: None, criterion=lambda r: r.chi2)
+    assert probing_refits.astray(s, found).chi2 == kept
+    wanted = C10 == 30.0 and chi2 > 2
+    assert begun == ([{"energy.C10": 400.0, "effects.base-slip.compliance": 3e-5}] if wanted else [])

@@ -5,6 +5,7 @@ counts, with derivatives of the cheap one, and then a set may be given another p
 better derivatives, a fresh amplitude; or be asked what it is without one of its effects.
 """
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from tissuejax.diagnosis.search import ALLOWED, Search
 MODEST = 2.0  # chi-square per sample above which no simulation is as wrong as that, nor a descent stuck as high
 # iterations without one effect; the share of what was missing (fitted, or held out) from which on more is needed
 BRIEF, LACKING = 3, 0.25
+ASTRAY = 4.0  # times its start: the least by which a base parameter has gone astray
 ELSEWHERE = 0.5  # of the best place's gain: the least for an inclusion to be tried under another site
 
 
@@ -126,6 +128,19 @@ def released(s: Search, at: frozenset) -> frozenset:
         again = finish(s, r.keys, replace(r, values={**r.values, **away}))
         s.refits[at] = min(r, again, key=s.criterion)
     return at
+
+
+def astray(s: Search, r: Refit) -> Refit:
+    """r, or the same set begun from where the base began, if the base had gone far astray for want of an effect and
+    little is explained: a tissue of no stiffness at rest on a base that holds is no place to find one that slips from.
+    """
+    bench = s.bench
+    far = any(abs(math.log(r.values[p] / bench.start[p])) > math.log(ASTRAY) for p in bench.base if bench.free[p].log)
+    if r.chi2 < MODEST * r.n or not far:
+        return r
+    s.report(f"{' + '.join(r.keys)}, with the base from its start")
+    again = finish(s, r.keys, replace(r, values={**r.values, **{p: bench.start[p] for p in bench.base}}))
+    return min(r, again, key=s.criterion)
 
 
 def leave_out(s: Search, at: frozenset) -> None:

@@ -18,6 +18,7 @@ from tissuejax.diagnosis.probing_numerics import numerics
 from tissuejax.diagnosis.probing_refits import (
     LACKING,
     MODEST,
+    astray,
     finish,
     leave_out,
     polished,
@@ -203,7 +204,11 @@ def grow(s: Search, at: frozenset, most: int) -> list[frozenset]:
         done = s.refits[keys] = under_another_site(s, parent, score, finish(s, trial.keys, trial))
         s.report(f"{' + '.join(trial.keys)}: chi-square {done.chi2 / done.n:.3g}")
         grown.append(keys)
-    return grown + favourite(s, at, nominated, grown)
+    grown = grown + favourite(s, at, nominated, grown)
+    if grown and not at:
+        best = min(grown, key=lambda k: s.criterion(s.refits[k]))
+        s.refits[best] = astray(s, s.refits[best])
+    return grown
 
 
 def favourite(s: Search, at: frozenset, nominated: list[Score], grown: list[frozenset]) -> list[frozenset]:
