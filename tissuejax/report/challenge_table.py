@@ -15,10 +15,15 @@ TRUTHS = ("nothing", "outside the catalogue")
 
 
 def figures(graded: dict, out: str | os.PathLike) -> dict[str, Path]:
-    """Draw the pictures of the content of graded.json into a folder; returns their paths."""
+    """Draw the pictures of the content of graded.json into a folder; returns their paths.
+
+    A challenge of pairs alone has no single effect that could be taken for another: no "confusion".
+    """
     out = Path(out)
-    return {
-        "confusion": write_figure(out / "confusion.png", confusion_figure(graded["confusion"]), dpi=100),
+    drawn = {}
+    if graded["confusion"]:
+        drawn["confusion"] = write_figure(out / "confusion.png", confusion_figure(graded["confusion"]), dpi=100)
+    return drawn | {
         "by_size": write_figure(out / "by_size.png", size_figure(graded["by_size"]), dpi=100),
         "calibration": write_figure(
             out / "calibration.png", calibration_figure(graded["calibration"]["bins"]), dpi=100
