@@ -117,8 +117,8 @@ STRAY = (
 
 NAMES = tuple(c.name for c in CATALOGUED)
 
-# The rest stayed below three times the noise in two sets of strong effects; for a rig that gives way the measure of size
-# is blind (the recorded path moves, force and markers don't).
+# The rest stayed below three times the noise in two sets of strong effects; for a rig that gives way the measure of
+# size is blind (the recorded path moves, force and markers don't).
 LOUD = tuple(
     c
     for c in CATALOGUED
