@@ -1,11 +1,12 @@
 """The slide of the whole body over a bedding that gives way, kept from lagging in a run faster than life.
 
 On a soft bedding the slowest motion is the body's own slide in the plane (two translations and a turn): a mass M on a
-spring A / c, far slower than anything inside the tissue. Played f times faster than life its inertia counts f^2 times,
-and the body would trail behind the probe. So the mass of these three modes alone is divided by s (selective mass
-scaling: Olovsson, Simonsson & Unosson, Int. J. Numer. Meth. Engng 63, 2005): by as much as makes the slide as quick as
-the first shear mode, 2 a (a the mass damping), and at most by f^2, which leaves the inertia that it has in life. A bedding that
-is stiffer than that, and a run at the speed of life, have s = 1: nothing is added, to the last bit.
+spring A / c, far slower than anything inside the tissue. Played f times faster than life its inertia counts f^2
+times, and the body would trail behind the probe. So the mass of these three modes alone is divided by s (selective
+mass scaling: Olovsson, Simonsson & Unosson, Int. J. Numer. Meth. Engng 63, 2005): by as much as makes the slide as
+quick as the first shear mode, 2 a (a the mass damping), and at most by f^2, which leaves the inertia that it has in
+life. A bedding that is stiffer than that, and a run at the speed of life, have s = 1: nothing is added, to the last
+bit.
 """
 
 from typing import NamedTuple
