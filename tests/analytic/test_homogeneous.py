@@ -153,6 +153,35 @@ def test_machine_compliance_against_a_root_find():
         assert value == pytest.approx(stress(x), rel=1e-7, abs=1e-6)
 
 
+def test_what_ages_bends_the_rig():
+    """x + share f(t) P_e(x) = recorded: the rig feels the specimen as it is by then."""
+    mu, c, rate = 600.0, 4e-3, 0.4
+    share = c * SIZE["area"] / SIZE["height"]
+    model = Model(energy("reduced-polynomial-1")).with_effects(effect("machine-compliance"), effect("aging"))
+    values = {
+        "energy.C10": mu / 2,
+        "effects.machine-compliance.compliance": c,
+        "effects.aging.rate": rate,
+    }
+    drive = np.linspace(0.7, 1.4, 25)
+    found = predicted(model, values, "uniaxial", drive)
+    for time, recorded, value in zip(TIME, drive, found):
+        stress = lambda x, f=np.exp(rate * time): f * mu * (x - x**-2)  # noqa: E731
+        x = brentq(lambda x, r=recorded: x + share * stress(x) - r, 0.3, 2.0, xtol=1e-14)
+        assert value == pytest.approx(stress(x), rel=1e-6, abs=1e-6)
+
+
+def test_volume_ages_with_the_shape():
+    """The same deformation at every age: the stress of a compressible specimen is its own, times the factor."""
+    young = Model(energy("reduced-polynomial-1")).with_effects(effect("compressibility"))
+    values = {"energy.C10": 300.0, "effects.compressibility.immediate": 2e-4}
+    old, rate = young.with_effects(effect("aging")), 0.5
+    drive = np.linspace(0.8, 1.4, 25)
+    found = predicted(old, values | {"effects.aging.rate": rate}, "uniaxial", drive)
+    expected = np.exp(rate * TIME) * predicted(young, values, "uniaxial", drive)
+    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-9)
+
+
 def test_slack_against_its_definition():
     mu, gap = 600.0, 0.04
     model = Model(energy("reduced-polynomial-1")).with_effects(effect("slack"))

@@ -65,6 +65,28 @@ def test_prony_series_against_fine_quadrature(moduli):
     np.testing.assert_allclose(found, expected[::40], atol=2e-4 * np.abs(expected).max())
 
 
+def test_relaxation_of_the_nominal_stress_against_fine_quadrature():
+    time, fine = np.linspace(0, 15, 451), np.linspace(0, 15, 450 * 40 + 1)
+    l = drive(fine)
+    S11, S33, *_ = elastic(l)
+    P = reported(l, S11, S33)
+    expected = P - sum(g * (P - relaxed(P, fine, tau)) for g, tau in zip(G, TAU))
+    found = predicted(effect("viscoelasticity"), VISCOUS | {"effects.viscoelasticity.nominal": 1.0}, time)
+    np.testing.assert_allclose(found, expected[::40], atol=2e-4 * np.abs(expected).max())
+
+
+def test_both_directions_of_a_biaxial_test_relax_alike():
+    """The nominal stress in each of two equal directions relaxes as in an equibiaxial test."""
+    time = np.linspace(0, 15, 151)
+    l = 1 + ramp(time, (0, 0), (2, 0.2), (15, 0.2))
+    both = recording("b", "biaxial", time, np.stack([l, l], -1))
+    sample = Sample("s", {"b": both, "e": recording("e", "equibiaxial", time, l)})
+    values = VALUES | VISCOUS | {"effects.viscoelasticity.nominal": 1.0}
+    found = stresses(predictor(BASE.with_effects(effect("viscoelasticity")), sample).predict(values))
+    np.testing.assert_allclose(found["b"], np.stack([found["e"], found["e"]], -1), rtol=1e-9, atol=1e-9)
+    assert found["e"][-1] < 0.8 * found["e"].max()
+
+
 def test_fading_is_exact_for_a_ramp_and_converges_from_below():
     """Ramp a t: h = a tau (1 - exp(-t/tau)), whatever the sampling."""
     t = jnp.sort(jnp.concatenate([jnp.zeros(1), jnp.asarray(np.random.default_rng(3).uniform(0, 9, 100))]))

@@ -214,6 +214,17 @@ def entries(sizes: Sizes) -> list[Entry]:
                     {**third, "moduli": (1.0,)},
                     nominated=False,
                 ),
+                Form(
+                    "two times of the nominal stress",
+                    ("g1", "g2", "tau1", "tau2", "nominal"),
+                    {**pairs, "nominal": (1.0,)},
+                ),
+                Form(
+                    "three times of the nominal stress",
+                    ("g1", "g2", "g3", "tau1", "tau2", "tau3", "nominal"),
+                    {**third, "nominal": (1.0,)},
+                    nominated=False,
+                ),
             ),
         ),
         "softening": (

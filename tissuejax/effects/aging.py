@@ -4,19 +4,20 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
-from jaxtyping import Array
+from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
 from tissuejax.effects.history import dying
-from tissuejax.effects.material_test import MaterialTest, Stress
+from tissuejax.effects.material_test import MaterialTest
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.recordings.recording import Channel
 
 
 class Aging(Effect):
-    """S = exp(rate T) S_e, T the time since the first recording: `start` of the recording plus its own time.
+    """P = exp(rate T) P_e, T the time since the first recording: `start` of the recording plus its own time.
 
+    All stiffness ages alike, against changes of shape and of volume: it is the whole nominal stress P that is scaled.
     With `settling` s, T counts as (1 - exp(-s T))/s: dying out for s > 0, gathering pace for s < 0. With `straight` q
     the factor is (1 + q rate T)^(1/q): a straight line in time at 1.
 
@@ -42,11 +43,14 @@ class Aging(Effect):
             Parameter("settling", "1/s", 0.0, lower=-0.02, upper=1.0, scale=1e-3, frozen=True, meaning=settling),
         )
 
-    def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:
+    def exerted(
+        self, p: Mapping[str, Array], test: MaterialTest, stress: Float[Array, "n ..."]
+    ) -> Float[Array, "n ..."]:
         power, q = p["rate"] * dying(test.start + test.elapsed, p["settling"]), p["straight"]
         straight = q > 1e-3
         q = jnp.where(straight, q, 1.0)
-        return state.scaled(jnp.exp(jnp.where(straight, jnp.log1p(jnp.maximum(q * power, -0.999)) / q, power)))
+        factor = jnp.exp(jnp.where(straight, jnp.log1p(jnp.maximum(q * power, -0.999)) / q, power))
+        return stress * (factor if stress.ndim == 1 else factor[:, None])
 
     def channels(
         self, p: Mapping[str, Array], test: ProbingTest, channels: Mapping[str, Channel]

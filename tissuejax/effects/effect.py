@@ -39,7 +39,8 @@ class Effect(eqx.Module):
 
     Hooks, in the order in which a material test applies them; each is the identity unless overridden:
         `stretch` (rig: what the specimen really saw), `energy` (added strain energy), `volume` (volume ratio from mean
-        stress), `memory` (isochoric stress with history), `stress` (rig and sensor: what the cell reports). Probing:
+        stress), `memory` (isochoric stress with history), `exerted` (nominal stress of the specimen as a whole, inside
+        the rig), `stress` (rig and sensor: what the cell reports). Probing:
         `scene` (the physical set-up: probe path, support, stiffness field, contact law, memory...), `channels`
         (sensors).
     """
@@ -89,6 +90,12 @@ class Effect(eqx.Module):
     def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:
         """Isochoric stress with history, from the elastic one."""
         return state
+
+    def exerted(
+        self, p: Mapping[str, Array], test: MaterialTest, stress: Float[Array, "n ..."]
+    ) -> Float[Array, "n ..."]:
+        """Nominal stress of the specimen over time, shape and volume alike, from that of its material."""
+        return stress
 
     def stress(
         self, p: Mapping[str, Array], test: MaterialTest, stress: Float[Array, "n ..."]

@@ -6,7 +6,7 @@ from typing import ClassVar
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
 from tissuejax.effects.history import fading
@@ -23,8 +23,9 @@ class Viscoelasticity(Effect):
     S_e is the elastic isochoric PK2 stress; with `moduli` it is instead 2 dpsi/dCbar before the isochoric projection,
     which is applied afterwards: then it is the moduli that relax, from the first sample on, and no stress is left
     when the specimen is back at its first length. Tissue is seen to follow either; the parameter `moduli` leads from
-    the one (0) to the other (1) in between. The energy's moduli are
-    INSTANTANEOUS ones; the long-term stress is (1 - sum_i g_i) of it (`long_term`). A recording starts from rested
+    the one (0) to the other (1) in between. With `nominal` 1 it is the nominal stress of the specimen itself that
+    relaxes, P(t) = P_e(t) - sum_i g_i (P_e - h_i), as in Fung's own quasi-linear law of a tension test. A probing knows
+    the first law alone. The energy's moduli are INSTANTANEOUS ones; the long-term stress is (1 - sum_i g_i) of it (`long_term`). A recording starts from rested
     tissue. `terms` relaxation times lie, to start with, in equal parts of the decades from `shortest` to `longest`
     seconds.
 
@@ -71,7 +72,10 @@ class Viscoelasticity(Effect):
                 Parameter(f"tau{i}", "s", float(t), lower=1e-4, upper=1e7, meaning=f"relaxation time {i}")
                 for i, t in zip(self._numbers, times)
             )
-            + (Parameter("moduli", "1", float(self.moduli), 0.0, 1.0, "share of the moduli's law", frozen=True),)
+            + (
+                Parameter("moduli", "1", float(self.moduli), 0.0, 1.0, "share of the moduli's law", frozen=True),
+                Parameter("nominal", "1", 0.0, 0.0, 1.0, "share of the nominal stress's law", frozen=True),
+            )
         )
 
     @property
@@ -83,19 +87,28 @@ class Viscoelasticity(Effect):
         return 1 - sum(p[f"g{i}"] for i in self._numbers)
 
     def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:
-        inverse, share = state.inverse, p.get("moduli", float(self.moduli))
+        inverse, share, rest = state.inverse, p.get("moduli", float(self.moduli)), 1 - p.get("nominal", 0.0)
         s = state.stacked()
         seen = s + share * state.spherical[:, None] * inverse
-        g = jnp.stack([jnp.asarray(p[f"g{i}"]) for i in self._numbers])
-        tau = jnp.stack([jnp.asarray(p[f"tau{i}"]) for i in self._numbers])
+        g, tau = self._series(p)
         h = jax.vmap(lambda t: fading(test.time, seen, t))(tau)
         h = h + share * jnp.exp(-test.elapsed[:, None] / tau[:, None, None]) * seen[0]  # moduli are there before strain
-        lost = jnp.tensordot(g, seen - h, 1)
+        lost = jnp.tensordot(rest * g, seen - h, 1)
         C = jnp.stack([state.C.xx, state.C.yy, state.C.zz, 2 * state.C.xy], -1)
         lost = lost - share * jnp.sum(lost * C, -1, keepdims=True) / 3 * inverse
         return state.replaced(s - lost)
 
+    def exerted(
+        self, p: Mapping[str, Array], test: MaterialTest, stress: Float[Array, "n ..."]
+    ) -> Float[Array, "n ..."]:
+        g, tau = self._series(p)
+        seen = stress.reshape(len(stress), -1)
+        h = jax.vmap(lambda t: fading(test.time, seen, t))(tau)
+        lost = jnp.tensordot(p.get("nominal", 0.0) * g, seen - h, 1)
+        return stress - lost.reshape(stress.shape)
+
     def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
-        g = jnp.stack([jnp.asarray(p[f"g{i}"]) for i in self._numbers])
-        tau = jnp.stack([jnp.asarray(p[f"tau{i}"]) for i in self._numbers])
-        return scene.put({"tissue.prony": Prony(g, tau)})
+        return scene.put({"tissue.prony": Prony(*self._series(p))})
+
+    def _series(self, p: Mapping[str, Array]) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
+        return tuple(jnp.stack([jnp.asarray(p[f"{name}{i}"]) for i in self._numbers]) for name in ("g", "tau"))

@@ -186,7 +186,10 @@ def specimen_stress(
     if swelling:
         ln_J = _swollen(swelling, test, ln_J, at, bool(lasting))
     F, S = at(ln_J)
-    return nominal(test, S, F)
+    stress = nominal(test, S, F)
+    for effect, p in effects:
+        stress = effect.exerted(p, test, stress)
+    return stress
 
 
 def elastic(model: Model, values: Values, test: MaterialTest, C: Sym) -> Stress:
