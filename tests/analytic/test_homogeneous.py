@@ -165,10 +165,10 @@ def test_what_ages_bends_the_rig():
     }
     drive = np.linspace(0.7, 1.4, 25)
     found = predicted(model, values, "uniaxial", drive)
-    for time, recorded, value in zip(TIME, drive, found):
-        stress = lambda x, f=np.exp(rate * time): f * mu * (x - x**-2)  # noqa: E731
-        x = brentq(lambda x, r=recorded: x + share * stress(x) - r, 0.3, 2.0, xtol=1e-14)
-        assert value == pytest.approx(stress(x), rel=1e-6, abs=1e-6)
+    factor = np.exp(rate * TIME)
+    for f, recorded, value in zip(factor, drive, found):
+        x = brentq(lambda x, f=f, r=recorded: x + share * f * mu * (x - x**-2) - r, 0.3, 2.0, xtol=1e-14)
+        assert value == pytest.approx(f * mu * (x - x**-2), rel=1e-6, abs=1e-6)
 
 
 def test_volume_ages_with_the_shape():

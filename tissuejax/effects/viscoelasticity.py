@@ -24,10 +24,10 @@ class Viscoelasticity(Effect):
     which is applied afterwards: then it is the moduli that relax, from the first sample on, and no stress is left
     when the specimen is back at its first length. Tissue is seen to follow either; the parameter `moduli` leads from
     the one (0) to the other (1) in between. With `nominal` 1 it is the nominal stress of the specimen itself that
-    relaxes, P(t) = P_e(t) - sum_i g_i (P_e - h_i), as in Fung's own quasi-linear law of a tension test. A probing knows
-    the first law alone. The energy's moduli are INSTANTANEOUS ones; the long-term stress is (1 - sum_i g_i) of it (`long_term`). A recording starts from rested
-    tissue. `terms` relaxation times lie, to start with, in equal parts of the decades from `shortest` to `longest`
-    seconds.
+    relaxes, P(t) = P_e(t) - sum_i g_i (P_e - h_i), as in Fung's own quasi-linear law of a tension test; a probing
+    knows the first law alone. The energy's moduli are INSTANTANEOUS ones; the long-term stress is (1 - sum_i g_i) of
+    it (`long_term`). A recording starts from rested tissue. `terms` relaxation times lie, to start with, in equal
+    parts of the decades from `shortest` to `longest` seconds.
 
     Revealed by force falling during holds, by hysteresis between loading and unloading, by stiffness rising with rate.
     Blind: one monotonic ramp at constant rate (it looks like another energy). Inseparable from softening in a single
