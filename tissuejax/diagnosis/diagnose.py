@@ -7,6 +7,7 @@ from pathlib import Path
 
 import jax
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from tissuejax.cache import keep_programs
 from tissuejax.diagnosis.decide import decide
@@ -85,7 +86,8 @@ def diagnose(
             f"{sample.name}: {n} samples for {len(bench.base)} parameters of {energy}; "
             "fit a smaller energy, or record more"
         )
-    with (progress or Silent()).stage(f"diagnosing {sample.name}") as stage:
+    # matrices are thin here: threads of the linear algebra would wait for each other and keep a core from the rest
+    with (progress or Silent()).stage(f"diagnosing {sample.name}") as stage, threadpool_limits(1, "blas"):
 
         def told(note: str) -> None:
             stage.advance(note=note)

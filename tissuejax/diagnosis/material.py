@@ -11,9 +11,9 @@ where the linearised program takes three times as long to compile as the predict
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import jax
 import numpy as np
@@ -37,9 +37,29 @@ STRESS = 0.05  # of the largest stress: the least scale of a modulus or an offse
 ADDED = ("effects.drift.", "effects.periodic.")  # added to the stress last: their derivative needs nothing else
 
 
-@partial(jax.jit, static_argnums=0)
-def _predict(model: Model, theta: Float[Array, " p"], test: MaterialTest) -> Float[Array, "n ..."]:
-    return nominal_stress(model, dict(zip(model.declared, theta)), test)
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A model that takes part in a search.
+
+    Attributes:
+        run: its compiled prediction, from theta (a value for every declared parameter) and a test.
+        places: by recording, neutral theta and where values go in it (`MaterialBench._places`).
+        price: what a prediction costs beside that of the base model.
+    """
+
+    run: Callable[[Float[Array, " p"], MaterialTest], Float[Array, "n ..."]]
+    places: Mapping[str, tuple[np.ndarray, tuple[dict[str, int], ...]]]
+    price: float
+
+
+@lru_cache(maxsize=64)
+def compiled(model: Model) -> Callable[[Float[Array, " p"], MaterialTest], Float[Array, "n ..."]]:
+    """One program a model, shared by all benches: to hash a model at every call costs a tenth of a diagnosis."""
+
+    def predicted(theta: Float[Array, " p"], test: MaterialTest) -> Float[Array, "n ..."]:
+        return nominal_stress(model, dict(zip(model.declared, theta)), test)
+
+    return jax.jit(predicted)
 
 
 def lengthened(test: MaterialTest) -> MaterialTest:
@@ -145,8 +165,7 @@ class MaterialBench(Bench):
     def _declare(self, energy: Energy, found: list[Entry]) -> None:
         recordings = (*self.fitted, *self.held_out)
         self._energy, self._entries = energy, found
-        self._built: dict[tuple[str, ...], tuple[Model, dict]] = {}
-        self._prices: dict[Model, float] = {}
+        self._built: dict[tuple[str, ...], Program] = {}
         self._full = [e.effect for e in found if e.spare is not None]
         self._dear = {e.effect.name for e in found if e.dear}
         heavy = self._dear.union(MEMORIES)
@@ -198,22 +217,20 @@ class MaterialBench(Bench):
             for path in self.base:
                 self.start[path] *= ratio if self.free[path].unit == "Pa" else 1.0
 
-    def _model(self, values: Mapping[str, float], paths: Sequence[str] = ()) -> tuple[Model, dict]:
-        """The model for a set of moving paths, with the places of its values.
-
-        Everything that costs nothing at once, and of the others those that take part.
-        """
-        parts = {d for p in (*values, *paths) for prefix, d in self._heavy.items() if p.startswith(prefix)}
+    def _program(self, values: Mapping[str, float]) -> Program:
+        """The program for a set of moving paths: all that costs nothing at once, and of the others what takes part."""
+        parts = {d for p in values for prefix, d in self._heavy.items() if p.startswith(prefix)}
         if parts.intersection(MEMORIES):  # together: one program fewer to compile
             parts |= {e.effect.name for e in self._entries if e.effect.name in MEMORIES}
-        rich = {self._rich[p] for p in (*values, *paths) if p in self._rich}
+        rich = {self._rich[p] for p in values if p in self._rich}
         key = (*sorted(parts), *sorted(rich))
         if key not in self._built:
             light = [e for e in self._entries if e.effect.name not in self._heavy.values()]
             taking = [*light, *(e for e in self._entries if e.effect.name in parts)]
             effects = tuple(e.spare if e.spare is not None and e.effect.name not in rich else e.effect for e in taking)
             model = Model(self._energy, None, effects)
-            self._built[key] = (model, {n: self._places(model, n) for n in self._tests})
+            places = {n: self._places(model, n) for n in self._tests}
+            self._built[key] = Program(compiled(model), places, self._price(model))
         return self._built[key]
 
     def _places(self, model: Model, name: str) -> tuple[np.ndarray, tuple[dict[str, int], ...]]:
@@ -223,8 +240,8 @@ class MaterialBench(Bench):
         both = [model.source_of(p, name)[::-1] for p in declared]
         return neutral, tuple({s[k]: i for i, s in enumerate(both) if len(s) > k} for k in (0, 1))
 
-    def _theta(self, sources: dict, values: Mapping[str, float], name: str) -> np.ndarray:
-        neutral, places = sources[name]
+    def _theta(self, program: Program, values: Mapping[str, float], name: str) -> np.ndarray:
+        neutral, places = program.places[name]
         theta = neutral.copy()
         for place in places:
             for path, value in values.items():
@@ -234,17 +251,17 @@ class MaterialBench(Bench):
 
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:
         """See `Bench.predict`."""
-        model, sources = self._model(values)
+        program = self._program(values)
         out = self.y.copy()
         for name in recordings or self._tests:
-            self._put(out, name, self._run(model, self._theta(sources, values, name), name))
+            self._put(out, name, self._run(program, self._theta(program, values, name), name))
         return out
 
-    def _run(self, model: Model, theta: Float[np.ndarray, " p"], name: str) -> Float[np.ndarray, "n ..."]:
+    def _run(self, program: Program, theta: Float[np.ndarray, " p"], name: str) -> Float[np.ndarray, "n ..."]:
         """One prediction; NaN where the faces of a specimen could not be found at such parameters."""
-        self.spent += self._price(model)
+        self.spent += program.price
         try:
-            return np.asarray(_predict(model, theta, self._tests[name]))
+            return np.asarray(program.run(theta, self._tests[name]))
         except (ValueError, RuntimeError) as error:  # raised inside the compiled program by its linear solver
             if "non-finite" not in str(error):
                 raise
@@ -252,15 +269,13 @@ class MaterialBench(Bench):
 
     def _price(self, model: Model) -> float:
         """What a prediction costs beside that of the base model, from measured times: searches multiply."""
-        if model not in self._prices:
-            names = {e.name for e in model.effects}
-            memory, fibres = bool(names.intersection(MEMORIES)), "anisotropy" in names
-            full = any(e in self._full for e in model.effects)
-            inner = 1.0 + 1.5 * memory + 4 * fibres + 3 * full
-            swelling = (8.0 if memory else 3.0) if "compressibility" in names else 1.0
-            rig = (8.0 if fibres or memory else 5.0) if "machine-compliance" in names else 1.0
-            self._prices[model] = inner * swelling * rig
-        return self._prices[model]
+        names = {e.name for e in model.effects}
+        memory, fibres = bool(names.intersection(MEMORIES)), "anisotropy" in names
+        full = any(e in self._full for e in model.effects)
+        inner = 1.0 + 1.5 * memory + 4 * fibres + 3 * full
+        swelling = (8.0 if memory else 3.0) if "compressibility" in names else 1.0
+        rig = (8.0 if fibres or memory else 5.0) if "machine-compliance" in names else 1.0
+        return inner * swelling * rig
 
     def _put(self, out: Float[np.ndarray, " N"], name: str, stress: Float[np.ndarray, "n ..."]) -> None:
         for s in self._of[name]:
@@ -272,20 +287,19 @@ class MaterialBench(Bench):
     ) -> Float[np.ndarray, "N k"]:
         """Second less first prediction of every pair of settings, equal ones run once; zero where both are the same."""
         out = np.zeros((len(pairs), len(self.y)))
-        groups: dict[Model, list[int]] = {}
+        groups: dict[Program, list[int]] = {}
         for i, (_, moved) in enumerate(pairs):
-            groups.setdefault(self._model(moved)[0], []).append(i)
-        for model, members in groups.items():
-            _, sources = self._model(pairs[members[0]][1])
+            groups.setdefault(self._program(moved), []).append(i)
+        for program, members in groups.items():
             for name in recordings or self._tests:
                 thetas: dict[bytes, np.ndarray] = {}
                 ends = []
                 for i in members:
-                    two = [self._theta(sources, values, name) for values in pairs[i]]
+                    two = [self._theta(program, values, name) for values in pairs[i]]
                     ends.append([t.tobytes() for t in two])
                     if ends[-1][0] != ends[-1][1]:
                         thetas.update(zip(ends[-1], two))
-                known = {k: self._run(model, t, name) for k, t in thetas.items()}
+                known = {k: self._run(program, t, name) for k, t in thetas.items()}
                 for i, (before, after) in zip(members, ends):
                     if before != after:
                         self._put(out[i], name, known[after] - known[before])
