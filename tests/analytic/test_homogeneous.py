@@ -104,6 +104,26 @@ def test_compressibility_effect_is_the_compressible_model():
     assert found == pytest.approx(9 * K * mu / (3 * K + mu) * 1e-6, rel=1e-4)
 
 
+@pytest.mark.parametrize(("form", "power", "close"), [("logarithmic", 1.0, 1e-7), ("quadratic", -0.5, 2e-4)])
+@pytest.mark.parametrize("fibres", [(), ("anisotropy",)])
+def test_compressibility_at_large_strain_is_a_volumetric_energy(form, power, close, fibres):
+    """Faces solved inside the model and the volume added by the effect, sideways as well where fibres hold one side."""
+    mu, K = 600.0, 1500.0
+    more = [effect(name) for name in fibres]
+    inside = Model(energy("reduced-polynomial-1"), volumetric(form)).with_effects(*more)
+    added = Model(energy("reduced-polynomial-1")).with_effects(effect("compressibility"), *more)
+    values = {"energy.C10": mu / 2}
+    if fibres:
+        values |= {"effects.anisotropy.k1": 900.0, "effects.anisotropy.k2": 1.0, "effects.anisotropy.angle": 1.2}
+    drive = np.linspace(0.75, 1.4, 25)
+    expected = predicted(inside, values | {"volumetric.K": K}, "uniaxial", drive)
+    swollen = {"effects.compressibility.immediate": 1 / K, "effects.compressibility.power": power}
+    found = predicted(added, values | swollen, "uniaxial", drive)
+    np.testing.assert_allclose(found, expected, atol=close * np.abs(expected).max())
+    tight = predicted(Model(energy("reduced-polynomial-1")).with_effects(*more), values, "uniaxial", drive)
+    assert np.abs(tight - expected).max() > 0.05 * np.abs(expected).max()
+
+
 @pytest.mark.parametrize("angle", [0.0, 0.4, np.pi / 2])
 def test_fibres_narrow_one_side_more(angle):
     """Uniaxial tension with fibres in the 1-2 plane: lateral stretch of least energy (scipy, own formulas)."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 from tissuejax.challenge.material import Ingredient, Specimen, modulus, reported
 from tissuejax.challenge.memory_laws import drained, prony, softening
@@ -114,6 +115,28 @@ def test_slow_drainage_settles_at_the_linear_answer():
     y = drained(t, np.full(len(t), 30.0), bulk=3000.0, tau=3.0)
     assert y[-1] == pytest.approx(-0.01, rel=1e-9)
     assert y[np.searchsorted(t, 3.0)] == pytest.approx(-0.01 * (1 - np.exp(-1)), rel=1e-6)
+
+
+def test_a_drained_specimen_with_fibres_narrows_as_its_least_energy_asks():
+    """Held for long it is one of K/2 (ln J)^2; both lateral stretches by scipy, from the energy written here."""
+    mu, k, amount, angle = 600.0, 900.0, 0.3, 0.5
+    K = (mu + k * np.sin(2 * angle) ** 2) / amount  # what a small shear feels of the fibres is in the modulus
+    fibre = Ingredient("anisotropy", "quadratic", k / mu, {"shape": 1.0, "along": [[np.cos(angle), np.sin(angle), 0]]})
+    leak = Ingredient("compressibility", "drained", amount, {"tau": 1.0})
+    l = np.minimum(np.linspace(1.0, 1.6, 201), 1.3)
+    found = reported(Specimen(Body({"10": mu / 2}), (fibre, leak)), trial("uniaxial", l, seconds=100.0))[-1]
+
+    def psi(l1, sides):
+        l2, l3 = np.exp(sides)
+        J = l1 * l2 * l3
+        thin = J ** (-2 / 3)
+        e = thin * ((np.cos(angle) * l1) ** 2 + (np.sin(angle) * l2) ** 2) - 1
+        iso = mu / 2 * (thin * (l1**2 + l2**2 + l3**2) - 3) + k / 2 * max(e, 0.0) ** 2
+        return iso + K / 2 * np.log(J) ** 2
+
+    h = 1e-4
+    low, high = (minimize(lambda s, l1=1.3 + d: psi(l1, s), [-0.1, -0.1], tol=1e-12).fun for d in (-h, h))
+    assert found == pytest.approx((high - low) / (2 * h), rel=1e-4)
 
 
 def test_rig_in_series_balances():

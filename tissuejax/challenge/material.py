@@ -107,6 +107,7 @@ def specimen_stress(specimen: Specimen, trial: Trial, drive: History) -> History
             push = kirchhoff(F, stress(F))[:, 2, 2]
             before, ln_J = ln_J, memory_laws.drained(trial.time, push, mu / leak.amount, **leak.shape)
             ln_J = before + 0.6 * (ln_J - before)  # without it a soft specimen overshoots, from loss to gain and back
+            _, skew = settle(trial, seen, stress, None, body.fibrous, mu, ln_J)
             F = gradient(trial.kind, seen, ln_J, skew)
             if np.max(np.abs(ln_J - before)) < 1e-9:
                 break

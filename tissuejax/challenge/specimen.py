@@ -104,6 +104,7 @@ def settle(
     bulk: float | None,
     fibres: bool,
     scale: float,
+    swollen: Float[np.ndarray, " n"] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """(ln J, skew) that free the lateral faces, by Newton's method at every time at once.
 
@@ -112,12 +113,15 @@ def settle(
         bulk: K of K/2 (J - 1)^2, Pa; None is incompressible.
         fibres: whether the lateral faces of a uniaxial specimen can differ.
         scale: a modulus, Pa, to make the residual a number.
+        swollen: ln J where it is known already (0 by default), of a specimen without `bulk`.
 
     Raises:
         NotConverged: no equilibrium of the faces after 60 steps.
     """
     n = len(drive)
     x = np.zeros((n, 2))
+    if swollen is not None:
+        x[:, 0] = swollen
     search = [bulk is not None, fibres and trial.kind == "uniaxial"]
     if not any(search):
         return x[:, 0], x[:, 1]
@@ -128,7 +132,8 @@ def settle(
         J = np.exp(x[:, 0])
         swell = tau[:, 2, 2] / scale + (0.0 if bulk is None else bulk * J * (J - 1) / scale)
         across = (tau[:, 1, 1] - tau[:, 2, 2]) / scale
-        return np.stack([swell if search[0] else x[:, 0], across if search[1] else x[:, 1]], -1)
+        known = x[:, 0] - (0.0 if swollen is None else swollen)
+        return np.stack([swell if search[0] else known, across if search[1] else x[:, 1]], -1)
 
     for _ in range(60):
         r = residual(x)

@@ -18,6 +18,7 @@ from tissuejax.diagnosis.bench import Candidate, Free
 from tissuejax.effects.aging import Aging
 from tissuejax.effects.anisotropy import Anisotropy
 from tissuejax.effects.catalogue import effects
+from tissuejax.effects.compressibility import Compressibility
 from tissuejax.effects.drift import Drift
 from tissuejax.effects.effect import Effect
 from tissuejax.effects.energy_form import EnergyForm
@@ -331,6 +332,18 @@ def entries(sizes: Sizes) -> list[Entry]:
                     "settling",
                     ("rate", "settling"),
                     {"settling": (1 / sizes.session, -0.5 / sizes.session)},
+                    nominated=False,
+                ),
+            ),
+        ),
+        "compressibility": (
+            Compressibility(),
+            (
+                Form("", ("immediate", "drained", "time"), dict(Compressibility.grid)),
+                Form(
+                    "another volumetric law",
+                    ("immediate", "drained", "time", "power"),
+                    {"power": (1.0,)},
                     nominated=False,
                 ),
             ),

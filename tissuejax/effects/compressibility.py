@@ -16,11 +16,11 @@ from tissuejax.tled.scene import Scene
 
 
 class Compressibility(Effect):
-    """ln J = immediate sigma_m + drained (sigma_m - h), h the past of the mean stress fading with `time`.
+    """ln J = immediate s + drained (s - h), s = sigma_m J^power, h the past of s fading with `time`.
 
     sigma_m is the mean Cauchy stress, `immediate` is 1/K at once, `drained` the further compressibility once the
     fluid has come to rest (one exponential: the slowest mode of consolidation). It adds to the base's own volumetric
-    energy.
+    energy. At rest `power` -1/2 is K/2 (J - 1)^2 to (ln J)^3/24, power 1 is K/2 (ln J)^2.
 
     Revealed by uniaxial and planar tests that disagree, and by relaxation in tests with free sides that is missing in
     shear. Blind: simple shear of an energy in I1 alone, and uniaxial tests alone (1/K is then taken up by the
@@ -42,11 +42,15 @@ class Compressibility(Effect):
             Parameter("immediate", "1/Pa", 0.0, lower=0.0, upper=1.0, scale=1e-5, meaning="1/K at once"),
             Parameter("drained", "1/Pa", 0.0, lower=0.0, upper=1.0, scale=1e-5, meaning="further 1/K after draining"),
             Parameter("time", "s", 10.0, lower=1e-3, upper=1e6, meaning="time of draining"),
+            Parameter("power", "1", -0.5, -2.0, 2.0, "of J: -1/2 quadratic in J, 1 in ln J", scale=0.5, frozen=True),
         )
 
-    def volume(self, p: Mapping[str, Array], test: MaterialTest, mean: Float[Array, " n"]) -> Float[Array, " n"]:
-        undrained = fading(test.time, mean[:, None], p["time"])[:, 0]
-        return p["immediate"] * mean + p["drained"] * (mean - undrained)
+    def volume(
+        self, p: Mapping[str, Array], test: MaterialTest, mean: Float[Array, " n"], ln_J: Float[Array, " n"]
+    ) -> Float[Array, " n"]:
+        felt = mean * jnp.exp(p["power"] * ln_J)
+        undrained = fading(test.time, felt[:, None], p["time"])[:, 0]
+        return p["immediate"] * felt + p["drained"] * (felt - undrained)
 
     def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
         # a held strain relaxes by g = 1 - 1/(1 + K drained), faster than a stress creeps: time / (1 + K drained)

@@ -82,9 +82,9 @@ class Effect(eqx.Module):
         return 0.0
 
     def volume(
-        self, p: Mapping[str, Array], test: MaterialTest, mean: Float[Array, " n"]
+        self, p: Mapping[str, Array], test: MaterialTest, mean: Float[Array, " n"], ln_J: Float[Array, " n"]
     ) -> Float[Array, " n"] | float:
-        """Added logarithmic volume strain ln J, from the mean Cauchy stress (tension positive), Pa."""
+        """Added logarithmic volume strain, from the mean Cauchy stress (tension positive), Pa, and the whole one."""
         return 0.0
 
     def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:

@@ -58,9 +58,7 @@ def lateral(
         return (J * slope - tau) / model.volumetric.bulk_modulus(p)
 
     def second_face(ln_J: Array, skew: Array, drive: Array) -> Array:
-        F = deformation(test, drive, ln_J, skew)
-        S = isochoric(right_cauchy_green(F)).S
-        across = (S.yy * F.b * F.b - S.zz * F.c * F.c) / shear_modulus
+        across = unlike(test, drive, ln_J, skew, isochoric) / shear_modulus
         return uniaxial * across + (1 - uniaxial) * skew
 
     if model.isotropic:
@@ -75,6 +73,15 @@ def lateral(
 
     ln_J, skew = jax.vmap(lambda one: _root(lambda y: both(y, one), jnp.zeros(2, zero.dtype)), out_axes=1)(drive)
     return ln_J, _exact_zero(skew)
+
+
+def unlike(
+    test: MaterialTest, drive: Array, ln_J: Array, skew: Array, isochoric: Callable[[Sym], Stress]
+) -> Float[Array, "..."]:
+    """Kirchhoff stress of the second face less that of the third, Pa: none where both are free."""
+    F = deformation(test, drive, ln_J, skew)
+    S = isochoric(right_cauchy_green(F)).S
+    return S.yy * F.b * F.b - S.zz * F.c * F.c
 
 
 def _each(residual: Callable[[Array], Array], start: Float[Array, " n"]) -> Float[Array, " n"]:

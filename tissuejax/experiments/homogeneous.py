@@ -24,7 +24,7 @@ from tissuejax.effects.material_test import MaterialTest, Stress
 from tissuejax.energies.strain import Strain
 from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.experiment import Experiment
-from tissuejax.experiments.free_faces import lateral
+from tissuejax.experiments.free_faces import lateral, unlike
 from tissuejax.experiments.kinematics import Gradient, deformation, hydrostatic, in_sample, nominal, right_cauchy_green
 from tissuejax.model import Model
 from tissuejax.parameters import Parameter, under
@@ -174,7 +174,7 @@ def specimen_stress(
 
     lasting = [(effect, p) for effect, p in effects if type(effect).memory is not Effect.memory]
 
-    def at(ln_J: Array, lasting: list = lasting) -> tuple[Gradient, Sym]:
+    def at(ln_J: Array, skew: Array, lasting: list = lasting) -> tuple[Gradient, Sym]:
         F = deformation(test, drive, ln_J, skew)
         state = isochoric(right_cauchy_green(F))
         for effect, p in lasting:
@@ -184,8 +184,13 @@ def specimen_stress(
     ln_J, skew = lateral(model, values, test, drive, isochoric)
     swelling = [(effect, p) for effect, p in effects if type(effect).volume is not Effect.volume]
     if swelling:
-        ln_J = _swollen(swelling, test, ln_J, at, bool(lasting))
-    F, S = at(ln_J)
+        turned = test.mode == "extension" and not model.isotropic
+
+        def across(ln_J: Array, skew: Array) -> Array:
+            return test.swell * unlike(test, drive, ln_J, skew, isochoric)
+
+        ln_J, skew = _swollen(swelling, test, (ln_J, skew), at, bool(lasting), across if turned else None)
+    F, S = at(ln_J, skew)
     stress = nominal(test, S, F)
     for effect, p in effects:
         stress = effect.exerted(p, test, stress)
@@ -218,25 +223,36 @@ def elastic(model: Model, values: Values, test: MaterialTest, C: Sym) -> Stress:
 def _swollen(
     effects: list[tuple[Effect, Values]],
     test: MaterialTest,
-    ln_J: Float[Array, " n"],
+    before: tuple[Float[Array, " n"], Float[Array, " n"]],
     at: Callable[..., tuple[Gradient, Sym]],
     lasting: bool,
-) -> Float[Array, " n"]:
-    """ln J with the volume strain that effects add under the mean stress, which itself depends on ln J.
+    across: Callable[[Array, Array], Array] | None,
+) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
+    """(ln J, skew) with the volume strain that effects add under the mean stress, which itself depends on both.
 
     Eight Newton steps with the elastic slope of the mean stress (all of it without memory; with it, a step leaves the
-    relaxed share times mu/K of the error, and costs a third of one with the slope through the memory).
+    relaxed share times mu/K of the error, and costs a third of one with the slope through the memory). Where the
+    lateral faces differ (`across`: the stress between them), a step of the skew follows each; it stays where it was
+    `before` where nothing swells.
     """
+    ln_J, skew = before
+    still = None if across is None else across(ln_J, skew)
 
-    def added(guess: Array, *elastic: list) -> Array:
-        F, S = at(guess, *elastic)
+    def added(guess: Array, skew: Array, *elastic: list) -> Array:
+        F, S = at(guess, skew, *elastic)
         mean = hydrostatic(S, F) * jnp.exp(-guess)
-        return ln_J + sum(effect.volume(p, test, mean) for effect, p in effects)
+        return ln_J + sum(effect.volume(p, test, mean, guess) for effect, p in effects)
 
-    def newton(guess: Array, _: None) -> tuple[Array, None]:
-        target, slope = jax.jvp(lambda x: added(x, []), (guess,), (jnp.ones_like(guess),))
-        target = added(guess) if lasting else target
+    def newton(state: tuple[Array, Array], _: None) -> tuple[tuple[Array, Array], None]:
+        guess, skew = state
+        target, slope = jax.jvp(lambda x: added(x, skew, []), (guess,), (jnp.ones_like(guess),))
+        target = added(guess, skew) if lasting else target
         step = (guess - target) / (1 - jnp.minimum(slope, 0.5))
-        return jnp.clip(guess - step, -1.5, 1.5), None
+        guess = jnp.clip(guess - step, -1.5, 1.5)
+        if across is not None:
+            pull, slope = jax.jvp(lambda x: across(guess, x), (skew,), (jnp.ones_like(skew),))
+            free = slope > 0  # never elsewhere than in tests whose second face is free
+            skew = skew - jnp.where(free, jnp.clip((pull - still) / jnp.where(free, slope, 1.0), -0.2, 0.2), 0.0)
+        return (guess, skew), None
 
-    return jax.lax.scan(newton, ln_J, None, length=8)[0]
+    return jax.lax.scan(newton, (ln_J, skew), None, length=8)[0]
