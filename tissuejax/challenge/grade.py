@@ -104,7 +104,8 @@ def rate(marks: list[Mark], is_true: Callable[[Mark], bool]) -> dict:
         return {"share": None, "low": None, "high": None, "of": 0}
     z, p = 1.96, k / n
     middle, half = p + z * z / (2 * n), z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
-    return {"share": p, "low": (middle - half) / (1 + z * z / n), "high": (middle + half) / (1 + z * z / n), "of": n}
+    low, high = ((middle + side) / (1 + z * z / n) for side in (-half, half))
+    return {"share": p, "low": max(low, 0.0), "high": min(high, 1.0), "of": n}  # rounding leaves the ends of 0 and 1
 
 
 def spread(values: Iterable[float]) -> dict:
