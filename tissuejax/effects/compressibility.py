@@ -20,7 +20,7 @@ class Compressibility(Effect):
 
     sigma_m is the mean Cauchy stress, `immediate` is 1/K at once, `drained` the further compressibility once the
     fluid has come to rest (one exponential: the slowest mode of consolidation). It adds to the base's own volumetric
-    energy. At rest `power` -1/2 is K/2 (J - 1)^2 to (ln J)^3/24, power 1 is K/2 (ln J)^2.
+    energy. `power` says of which law: -1/2 (the default) is K/2 (J - 1)^2 up to (ln J)^3/24, 1 is K/2 (ln J)^2.
 
     Revealed by uniaxial and planar tests that disagree, and by relaxation in tests with free sides that is missing in
     shear. Blind: simple shear of an energy in I1 alone, and uniaxial tests alone (1/K is then taken up by the
