@@ -54,7 +54,7 @@ class Program:
 
 @lru_cache(maxsize=64)
 def compiled(model: Model) -> Callable[[Float[Array, " p"], MaterialTest], Float[Array, "n ..."]]:
-    """One program a model, shared by all benches: to hash a model at every call took about a tenth of one."""
+    """One program a model, shared by all benches: hashing it at every call took a tenth of a diagnosis."""
 
     def predicted(theta: Float[Array, " p"], test: MaterialTest) -> Float[Array, "n ..."]:
         return nominal_stress(model, dict(zip(model.declared, theta)), test)
