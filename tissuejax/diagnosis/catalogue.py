@@ -201,6 +201,7 @@ def entries(sizes: Sizes) -> list[Entry]:
     steepest = {"exponent": 4 / sizes.strain**2}  # e^12 at the largest strain: I1bar - 3 is about 3 strain^2
     stretched = math.expm1(2 * sizes.strain)  # the largest squared stretch less 1
     fibres = 10 / stretched**2  # e^10 there
+    mild = {"k2": (min(1.0, fibres / 10),)}  # steep fibres can't be told that they are crimped: nothing is left of them
     special = {
         "viscoelasticity": (
             Viscoelasticity(terms=3),
@@ -290,13 +291,13 @@ def entries(sizes: Sizes) -> list[Entry]:
                 Form(
                     "in the xy plane",
                     ("k1", "k2", "angle"),
-                    {"angle": tuple(0.15 + np.arange(4) * np.pi / 4), "k2": (min(1.0, fibres / 10),)},
+                    {"angle": tuple(0.15 + np.arange(4) * np.pi / 4), **mild},
                     most={"k2": fibres},
                 ),
                 Form(
                     "any direction",
                     ("k1", "k2", "angle", "elevation"),
-                    {"elevation": (0.8, -0.8)},
+                    {"elevation": (0.3, -0.8)},
                     nominated=False,
                     most={"k2": fibres},
                 ),
@@ -310,14 +311,14 @@ def entries(sizes: Sizes) -> list[Entry]:
                 Form(
                     "crimped",
                     ("k1", "k2", "angle", "onset"),
-                    {"onset": (0.2 * stretched, 0.5 * stretched)},
+                    {"onset": (0.1 * stretched, 0.4 * stretched), **mild},
                     nominated=False,
                     most={"k2": fibres},
                 ),
                 Form(
                     "crimped, two families",
                     ("k1", "k2", "angle", "spread", "onset"),
-                    {"onset": (0.2 * stretched,), "spread": (0.4,)},
+                    {"onset": (0.05 * stretched,), "spread": (0.05, 0.4), **mild},
                     nominated=False,
                     most={"k2": fibres},
                 ),

@@ -1,15 +1,15 @@
 """Sets next to a set: the same effects in other forms, and one effect less.
 
 Each effect of a set may be there in the wrong form (one relaxation time where there are two), and an effect may have
-been only a stepping stone. Of a set of one all forms are fitted to the end. Of larger sets, where a form costs ten
-times as much, each is given a few steps, and only the best are finished: that leaves something for sets of three.
+been only a stepping stone. Every form is given a few steps, of a single effect from more starts, and only the best are
+finished: what the other forms of one effect would cost is better spent on the forms of pairs, and on sets of three.
 """
 
 from tissuejax.diagnosis.quality import quality
 from tissuejax.diagnosis.refit import Refit
 
 ROUNDS = 4
-FINISHED = 2  # neighbours of a set of several effects that are fitted to the end in a round
+FINISHED = 2  # neighbours of a set that are fitted to the end in a round
 PROMISING = 30.0  # by which the criterion of a neighbour may exceed that of the set after a few steps
 LOST = 0.4  # share of the misfit: a set that leaves so much more than one effect more does isn't saved by other forms
 
@@ -40,14 +40,14 @@ def neighbours(s, parent: Refit) -> list[frozenset]:
                 order = tuple(new if k == old else k for k in parent.keys)
                 s.report(" + ".join(order))
                 starts = [{**parent.values, **setting} for setting in s.bench.candidates[new].grid]
-                if len(at) == 1 or s.bench.dear:
-                    cheap = not s.bench.dear
-                    whole = cheap and not s.bench.candidates[new].nominated  # no score tells which start is promising
-                    most = len(starts) if whole else s.budget.starts + cheap
-                    s.refits[key] = s.finished(order, starts[:most])
+                if s.bench.dear:
+                    s.refits[key] = s.finished(order, starts[: s.budget.starts])
                     known.append(key)
                 else:
-                    begun.append(s.begun(order, starts[: s.budget.starts], held=True))
+                    # of one effect no score tells which start of such a form is promising
+                    whole = len(at) == 1 and not s.bench.candidates[new].nominated
+                    most = len(starts) if whole else s.budget.starts + (len(at) == 1)
+                    begun.append(s.begun(order, starts[:most], held=True))
     for rank, r in enumerate(sorted(begun, key=s.criterion)):
         key = frozenset(r.keys)
         if s.criterion(r) < s.criterion(parent) + PROMISING and (rank < FINISHED or s.patient):

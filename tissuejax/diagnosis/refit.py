@@ -15,7 +15,7 @@ from scipy.optimize import lsq_linear
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.misfit import Misfit
 
-HOPELESS = 5e-4  # of what exceeds noise: a fit that leaves much is not polished
+HOPELESS = 2e-3  # of what exceeds noise: a fit that leaves much is not polished
 NOTHING = 1e-5  # of the largest effect of a parameter, each moved by its scale: what a one-sided difference errs by
 FREE = 1e-4  # damping below which a step of a true Jacobian that gains nothing is the end
 TURN = 0.8  # rad: the longest step of an angle, a quarter of it after every step that gained nothing

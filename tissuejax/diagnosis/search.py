@@ -28,6 +28,7 @@ from tissuejax.errors import NotConverged
 LEAST = 2  # sets finished at each size, whatever they cost
 ELSEWHERE = 2  # other places to start from that are followed to the end
 SHORT = 4  # settings of a shape that are all tried where nothing is named yet
+PURSUED = 3  # sets whose other forms are tried with what is left in the end, where none has left noise only
 ALLOWED = 1.5  # chi-square per sample up to which a fit explains its recordings
 
 
@@ -48,7 +49,8 @@ class Budget:
         patience: cost up to which nominees beyond `finished` are refitted to the end too, by size, as long as none
             leaves noise only: a few steps say little of a set whose shapes have far to go.
         spend: cost of all predictions so far, in those of the base model, after which nothing more is tried at a size
-            (`Bench.spent`); the last for leaving effects out in the end. 6e4 are about a minute of one processor.
+            (`Bench.spent`), other forms halfway to the next; the last for leaving effects out in the end. 6e4 are about
+            a minute of one processor.
         burden: searches and memories nested in a prediction at most (`Bench.burden`): three take a second a prediction.
     """
 
@@ -74,7 +76,7 @@ class Search:
         refits: by set of keys.
         scored: scores at each set that was extended.
         misfit: noise under which the refits are compared.
-        size: effects in the sets that are being extended.
+        size: effects in the sets that are being extended; a half more while other forms of them are tried.
         dropped: sets that were given a few steps and left.
     """
 
@@ -85,7 +87,7 @@ class Search:
     scored: dict[frozenset, list[Score]] = field(default_factory=dict)
     report: Callable[[str], None] = lambda _: None
     kept: KeptRefits | None = None
-    size: int = 0
+    size: float = 0
     dropped: set[frozenset] = field(default_factory=set)
     _doubts: dict[frozenset, tuple[Refit, tuple[str, ...]]] = field(default_factory=dict)
 
@@ -105,14 +107,14 @@ class Search:
 
     @property
     def exhausted(self) -> bool:
-        """Whether what the search may spend is spent."""
+        """Whether what the search may spend is spent: between two sizes, what lies between the two."""
         spend = self.budget.spend
-        return not self.bench.dear and self.bench.spent > spend[min(self.size, len(spend) - 1)]
+        return not self.bench.dear and self.bench.spent > np.interp(self.size, range(len(spend)), spend)
 
     @property
     def patient(self) -> bool:
         """Whether sets that a few steps don't put first are refitted to the end too; see `Budget.patience`."""
-        patience = self.budget.patience[min(self.size, len(self.budget.patience) - 1)]
+        patience = self.budget.patience[min(math.ceil(self.size), len(self.budget.patience) - 1)]
         return not self.bench.dear and self.bench.spent < patience and not quality(self, self.best).noise
 
     @property
@@ -245,6 +247,8 @@ class Search:
         # the fitted recordings explained and the held-out ones not: the former may allow other values as well
         if self.bench.dear or found.chi2 > ALLOWED * found.n or found.held <= ALLOWED * found.n_held:
             return found
+        if any(self.fitted(r) < self.fitted(found) for k, r in self.refits.items() if len(k) <= len(keys)):
+            return found  # another set explains them better: it is followed first
         others = [{**found.values, **other} for other in self.bench.elsewhere(found.values)]
         begun = [] if self.exhausted else [self.begun(keys, [other], held=True) for other in others]
         for again in sorted(begun, key=self.criterion)[:ELSEWHERE]:
@@ -324,6 +328,7 @@ def search(
             break
         if size == 0 and not bench.dear:
             renew_noise(s)
+        s.size = size + 0.5  # beyond what the extensions may spend, before what the next ones may
         for keys in promising(s, 1 if bench.dear else (4, 2, 1)[min(size, 2)]):
             reshape(s, keys)
         short |= s.exhausted
@@ -338,6 +343,9 @@ def search(
     if not bench.dear:
         s.size = budget.most
         leave_out(s)
+        for keys in promising(s, PURSUED):
+            if not quality(s, s.best).noise:
+                reshape(s, keys)
         if short or s.exhausted:
             bench.warnings.append(
                 "the search ended when its budget was spent: larger sets of effects were not all tried"

@@ -42,7 +42,7 @@ class Compressibility(Effect):
             Parameter("immediate", "1/Pa", 0.0, lower=0.0, upper=1.0, scale=1e-5, meaning="1/K at once"),
             Parameter("drained", "1/Pa", 0.0, lower=0.0, upper=1.0, scale=1e-5, meaning="further 1/K after draining"),
             Parameter("time", "s", 10.0, lower=1e-3, upper=1e6, meaning="time of draining"),
-            Parameter("power", "1", -0.5, -2.0, 2.0, "of J: -1/2 quadratic in J, 1 in ln J", scale=0.5, frozen=True),
+            Parameter("power", "1", -0.5, -0.5, 1.0, "of J: -1/2 quadratic in J, 1 in ln J", scale=0.5, frozen=True),
         )
 
     def volume(
