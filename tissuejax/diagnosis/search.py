@@ -49,7 +49,7 @@ class Budget:
         patience: cost up to which nominees beyond `finished` are refitted to the end too, by size, as long as none
             leaves noise only: a few steps say little of a set whose shapes have far to go.
         spend: cost of all predictions so far, in those of the base model, after which nothing more is tried at a size
-            (`Bench.spent`), other forms halfway to the next; the last for leaving effects out in the end. 6e4 are about
+            (`Bench.spent`), other forms halfway to the next; the last for leaving effects out in the end. 5.5e4 are about
             a minute of one processor.
         burden: searches and memories nested in a prediction at most (`Bench.burden`): three take a second a prediction.
     """
@@ -64,7 +64,7 @@ class Budget:
     finished: tuple[int, ...] = (6, 4, 3)
     promise: float = 0.6
     patience: tuple[float, ...] = (5e3, 1.5e4, 2.5e4)
-    spend: tuple[float, ...] = (2.5e4, 4e4, 5e4, 6e4)
+    spend: tuple[float, ...] = (2.5e4, 4e4, 5e4, 5.5e4)
     burden: int = 2
 
 
