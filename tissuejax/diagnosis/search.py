@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tissuejax.diagnosis.bench import Bench, Candidate
+from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.kept_refits import KeptRefits
 from tissuejax.diagnosis.misfit import Misfit, estimated, white
 from tissuejax.diagnosis.neighbours import leave_out, reshape
@@ -23,11 +23,11 @@ from tissuejax.diagnosis.plausible import doubts, on_limit
 from tissuejax.diagnosis.quality import quality
 from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.score import Score, scores
+from tissuejax.diagnosis.starts import distinct, inside
 from tissuejax.errors import NotConverged
 
 LEAST = 2  # sets finished at each size, whatever they cost
 ELSEWHERE = 2  # other places to start from that are followed to the end
-SHORT = 4  # settings of a shape that are all tried where nothing is named yet
 PURSUED = 3  # sets whose other forms are tried with what is left in the end, where none has left noise only
 ALLOWED = 1.5  # chi-square per sample up to which a fit explains its recordings
 
@@ -49,8 +49,8 @@ class Budget:
         patience: cost up to which nominees beyond `finished` are refitted to the end too, by size, as long as none
             leaves noise only: a few steps say little of a set whose shapes have far to go.
         spend: cost of all predictions so far, in those of the base model, after which nothing more is tried at a size
-            (`Bench.spent`), other forms halfway to the next; the last for leaving effects out in the end. 5.5e4 are about
-            a minute of one processor.
+            (`Bench.spent`), other forms halfway to the next; the last for leaving effects out in the end. 5.5e4 are
+            about a minute of one processor.
         burden: searches and memories nested in a prediction at most (`Bench.burden`): three take a second a prediction.
     """
 
@@ -261,37 +261,6 @@ class Search:
         old = self.refits[keys]
         self.refits[keys] = self.refit(old.keys, old.values, iterations=self.budget.iterations)
         return self.refits[keys]
-
-
-def inside(
-    bench: Bench, candidate: Candidate, step: Mapping[str, float], setting: Mapping[str, float], values: Mapping
-) -> dict[str, float]:
-    """Amplitudes after the linear step, pulled inside their bounds: a step is trusted only so far."""
-    out = {}
-    for path in candidate.amplitudes:
-        free = bench.free[path]
-        origin = {**bench.start, **values, **setting}[path]
-        low, high = max(free.lower, origin - 30 * free.scale), min(free.upper, origin + 30 * free.scale)
-        value = float(np.clip(origin + step[path], low, high))
-        if value in (free.lower, free.upper) and math.isfinite(free.upper - free.lower):
-            value = 0.9 * value + 0.1 * origin if value != origin else value
-        out[path] = value
-    return out
-
-
-def distinct(score: Score, most: int, whole: bool = False) -> list[tuple[float, dict, dict]]:
-    """The best settings whose gains are worth a start of their own; all of a short list if `whole`.
-
-    A linear step ranks directions of strong fibres badly: those that it sees first shorten and go slack.
-    """
-    if whole and len(score.settings) <= SHORT:
-        return list(score.settings)
-    kept = list(score.settings[:1])
-    for trial in score.settings[1:]:
-        if len(kept) >= most or trial[0] < 0.5 * kept[0][0]:
-            break
-        kept.append(trial)
-    return kept
 
 
 def search(
