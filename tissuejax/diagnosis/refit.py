@@ -16,6 +16,7 @@ from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.misfit import Misfit
 
 HOPELESS = 2e-3  # of what exceeds noise: a fit that leaves much is not polished
+HOPELESS_DEAR = 5e-4  # the same where a prediction is a simulation and valleys are flat
 NOTHING = 1e-5  # of the largest effect of a parameter, each moved by its scale: what a one-sided difference errs by
 FREE = 1e-4  # damping below which a step of a true Jacobian that gains nothing is the end
 TURN = 0.8  # rad: the longest step of an angle, a quarter of it after every step that gained nothing
@@ -134,6 +135,7 @@ class Descent:
         # a Jacobian from elsewhere may lack what vanishes there (shapes at zero amplitude): good for one step
         damping, small, age, given, first = 1e-3, 0, 0, jac is not None, True
         dear = self.bench.dear
+        hopeless = HOPELESS_DEAR if dear else HOPELESS
         tolerance *= EXACT if self.exact else 1.0
         for _ in range(iterations):
             if not np.isfinite(cost):
@@ -186,7 +188,7 @@ class Descent:
                 jac, given = None, False
             cost, x, r, prediction = new, trial, r_new, p_new
             damping = max(damping / 10, 1e-9)
-            tiny = drop < max(tolerance, HOPELESS * (cost - len(r)))
+            tiny = drop < max(tolerance, hopeless * (cost - len(r)))
             if tiny and not true:  # a corrected Jacobian, or one without the column of a shape, tells of no end
                 jac, given = None, False
                 continue
