@@ -3,6 +3,7 @@
 Each effect of a set may be there in the wrong form (one relaxation time where there are two), and an effect may have
 been only a stepping stone. Every form is given a few steps, of a single effect from more starts, and only the best are
 finished: what the other forms of one effect would cost is better spent on the forms of pairs, and on sets of three.
+Where predictions are cheap all are finished, also beside a set that leaves noise: one of them may be its rival.
 """
 
 from tissuejax.diagnosis.quality import quality
@@ -50,7 +51,8 @@ def neighbours(s, parent: Refit) -> list[frozenset]:
                     begun.append(s.begun(order, starts[:most], held=True))
     for rank, r in enumerate(sorted(begun, key=s.criterion)):
         key = frozenset(r.keys)
-        if s.criterion(r) < s.criterion(parent) + PROMISING and (rank < FINISHED or s.patient):
+        promising = s.criterion(r) < s.criterion(parent) + PROMISING and (rank < FINISHED or s.patient)
+        if promising or s.early:
             s.refits[key] = s.finished(r.keys, [r.values])
             known.append(key)
         else:

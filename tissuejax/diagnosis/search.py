@@ -47,7 +47,8 @@ class Budget:
         finished: nominees refitted to the end at each size; the rest are dropped after a few steps.
         promise: share of the excess that the best pair must explain for a third effect to be sought.
         patience: cost up to which nominees beyond `finished` are refitted to the end too, by size, as long as none
-            leaves noise only: a few steps say little of a set whose shapes have far to go.
+            leaves noise only: a few steps say little of a set whose shapes have far to go. Up to the first of these
+            costs all forms beside a set are.
         spend: cost of all predictions so far, in those of the base model, after which nothing more is tried at a size
             (`Bench.spent`), other forms halfway to the next; the last for leaving effects out in the end. 5.5e4 are
             about a minute of one processor.
@@ -116,6 +117,11 @@ class Search:
         """Whether sets that a few steps don't put first are refitted to the end too; see `Budget.patience`."""
         patience = self.budget.patience[min(math.ceil(self.size), len(self.budget.patience) - 1)]
         return not self.bench.dear and self.bench.spent < patience and not quality(self, self.best).noise
+
+    @property
+    def early(self) -> bool:
+        """Whether so little has been spent that a few steps need not decide which forms are refitted to the end."""
+        return not self.bench.dear and self.bench.spent < self.budget.patience[0]
 
     @property
     def best(self) -> Refit:

@@ -80,7 +80,8 @@ def size_figure(by_size: list[dict]) -> Figure:
     ax.set_ylim(-0.03, 1.03)
     ax.set_xlabel("rms of the effect beyond a refitted base, over the noise")
     ax.set_ylabel("share of cases")
-    ax.legend(fontsize=8, frameon=False)
+    if ax.get_legend_handles_labels()[0]:  # a challenge may hold no case of any of these
+        ax.legend(fontsize=8, frameon=False)
     return figure
 
 
