@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from spring_bench import CANDIDATES, Spring, spring
 
+from tissuejax.diagnosis import neighbours
 from tissuejax.diagnosis.bench import Candidate
 from tissuejax.diagnosis.material import MaterialBench
 from tissuejax.diagnosis.misfit import white
@@ -54,6 +55,18 @@ def test_what_is_left_in_the_end_goes_to_other_forms_of_the_leading_sets(last, r
     s = search(made, Budget(most=2, spend=(1e4, 1e4, last)), report)
     assert ("form/rich" in told) == reached
     assert (s.best.keys == ("form/rich",)) == reached
+
+
+@pytest.mark.parametrize(("spent", "kept"), [(0.0, True), (1e4, False)], ids=["little", "more"])
+def test_a_form_that_few_steps_do_not_show_is_refitted_to_the_end_where_little_has_been_spent(spent, kept, monkeypatch):
+    made = counting()
+    s = Search(made, white(made), Budget())
+    s.refits[frozenset()] = s.refit((), {})
+    plain = s.refits[frozenset({"form"})] = s.refit(("form",), {})
+    monkeypatch.setattr(neighbours, "PROMISING", -np.inf)
+    made.spent = spent
+    assert (frozenset({"form/rich"}) in neighbours.neighbours(s, plain)) == kept
+    assert (frozenset({"form/rich"}) in s.dropped) != kept
 
 
 @pytest.fixture(scope="module")

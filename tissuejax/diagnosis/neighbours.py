@@ -51,8 +51,8 @@ def neighbours(s, parent: Refit) -> list[frozenset]:
                     begun.append(s.begun(order, starts[:most], held=True))
     for rank, r in enumerate(sorted(begun, key=s.criterion)):
         key = frozenset(r.keys)
-        promising = s.criterion(r) < s.criterion(parent) + PROMISING and (rank < FINISHED or s.patient)
-        if promising or s.early:
+        near = s.criterion(r) < s.criterion(parent) + PROMISING and (rank < FINISHED or s.patient)
+        if near or s.early:
             s.refits[key] = s.finished(r.keys, [r.values])
             known.append(key)
         else:
