@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from tissuejax.cache import keep_programs
 from tissuejax.diagnosis.decide import decide
+from tissuejax.diagnosis.foreseen import OPEN, foreseen
 from tissuejax.diagnosis.kept_refits import KeptRefits
 from tissuejax.diagnosis.material import MaterialBench
 from tissuejax.diagnosis.next_experiment import proposals, settling
@@ -104,7 +105,11 @@ def diagnose(
     maps = []
     if kind == "probing" and verdict.kind != "nothing-missing":
         maps = stiffness_maps(bench, found.empty.values, found.empty.prediction)
-    diagnosis = Diagnosis(sample.name, energy, found, verdict, time.perf_counter() - begun, ideas, maps)
+    open_ends = []
+    if kind == "homogeneous" and verdict.kind != "unexplained":  # a probing's derivative is minutes of simulations
+        open_ends = foreseen(bench, found.misfit, verdict.chosen)
+        bench.warnings += [x.sentence(verdict.chosen) for x in open_ends if x.over_noise > OPEN]
+    diagnosis = Diagnosis(sample.name, energy, found, verdict, time.perf_counter() - begun, ideas, maps, open_ends)
     if kind == "probing":
         bench.runs.forget()
     else:

@@ -25,6 +25,7 @@ class Diagnosis:
         seconds: wall time.
         proposals: what to measure next (`next_experiment.Proposal`), best first.
         maps: of probings: where each fitted recording wants the tissue stiffer or softer (`stiffness_map`).
+        foreseen: of material tests: what the fitted recordings leave open in the held-out ones (`foreseen`).
     """
 
     sample: str
@@ -34,6 +35,7 @@ class Diagnosis:
     seconds: float
     proposals: list = field(default_factory=list)
     maps: list = field(default_factory=list)
+    foreseen: list = field(default_factory=list)
 
     def located(self) -> list[Located]:
         """Where the base model misses: in time, drive, channel, and in space where maps were made."""
@@ -57,6 +59,7 @@ class Diagnosis:
             "sets": self.sets(1000),
             "before": self.errors(s.empty),
             "after": self.errors(v.chosen),
+            "held_out_uncertainty": [x.as_dict() for x in self.foreseen],
             "base_parameters": self.base(),
             "numerical_error": self.numerical(s.empty),
             "numerical_error_after": self.numerical(v.chosen),
