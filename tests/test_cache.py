@@ -100,6 +100,7 @@ def test_a_program_that_calls_back_runs_and_is_not_kept(kept_in):
 
     assert np.allclose(Kept(calls_back, "calls back")(A), np.cos(A), atol=1e-15)
     assert np.allclose(Kept(calls_back, "calls back")(A), np.cos(A), atol=1e-15)
+    assert not kept_in.exists()
 
 
 def test_a_model_s_text_holds_its_laws_and_their_numbers():

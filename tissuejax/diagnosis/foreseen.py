@@ -27,7 +27,7 @@ class Foreseen:
     Attributes:
         std: root mean square of the prediction's standard error over the recording, in `unit`.
         over_noise: the same in units of the recording's noise.
-        path: the parameter of which knowing the value would close most of it; empty where nothing is fitted.
+        path: the parameter of which knowing the value would close most of it.
     """
 
     recording: str
