@@ -3,21 +3,40 @@
 import tissuejax as tj
 found = tj.fit("sample.h5", energy="reduced-polynomial-2", holdout=["r3"])
 
-The verbs (`read`, `material`, `fit`, `diagnose`, `write`, `sensitivity`, `catalogue`) load on first use, so that
-importing a single module of the package stays cheap. Rooms are imported by their path,
-`from tissuejax.energies.strain import Strain`.
+Verbs and nouns load on first use, so that importing a single module of the package stays cheap. Everything else is
+imported by its path, `from tissuejax.energies.strain import Strain`.
 """
 
 import importlib
 
 VERBS = ("catalogue", "diagnose", "fit", "material", "read", "sensitivity", "write")
+NOUNS = {
+    "Channel": "recordings.recording",
+    "Diagnosis": "diagnosis.result",
+    "Effect": "effects.effect",
+    "Energy": "energies.energy",
+    "Fit": "fitting.result",
+    "InputError": "errors",
+    "Model": "model",
+    "NotConverged": "errors",
+    "Recording": "recordings.recording",
+    "Sample": "recordings.recording",
+}
+
+__all__ = [*VERBS, *NOUNS, "__version__"]
 
 
 def __getattr__(name: str):
+    if name == "__version__":
+        return importlib.import_module("importlib.metadata").version("tissuejax")
     if name in VERBS:
         return getattr(importlib.import_module("tissuejax.verbs"), name)
-    raise AttributeError(f"module 'tissuejax' has no attribute {name!r}; its verbs are {', '.join(VERBS)}")
+    if name in NOUNS:
+        return getattr(importlib.import_module(f"tissuejax.{NOUNS[name]}"), name)
+    raise AttributeError(
+        f"module 'tissuejax' has no attribute {name!r}; its verbs are {', '.join(VERBS)}, its nouns {', '.join(NOUNS)}"
+    )
 
 
 def __dir__():
-    return sorted({*globals(), *VERBS})
+    return sorted({*globals(), *__all__})

@@ -5,6 +5,7 @@ import importlib
 import inspect
 import pkgutil
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -95,6 +96,14 @@ def test_file_lengths():
     assert package[len(package) // 2] <= 160, "median file has grown past 160 lines (design: near 120)"
 
 
+def test_the_front_door_offers_verbs_nouns_and_a_version():
+    assert tissuejax.__version__.count(".") == 2
+    for name in tissuejax.__all__:
+        assert getattr(tissuejax, name) is not None
+    with pytest.raises(AttributeError, match="its verbs are .*fit.*nouns .*Sample"):
+        tissuejax.Sampel  # noqa: B018
+
+
 def test_no_vague_names():
     vague = {"utils", "helpers", "base", "misc", "common"}
     assert not [p for p in FILES if p.stem in vague]
@@ -116,14 +125,45 @@ def test_public_docstrings():
     assert not bare, f"without a docstring: {bare}"
 
 
-def test_readme_code_runs(tmp_path, monkeypatch):
-    text = (PROJECT / "README.md").read_text()
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md"])
+def test_code_of_the_pages_runs(page, tmp_path, monkeypatch):
+    text = (PROJECT / page).read_text()
     blocks = re.findall(r"```python\n(.*?)```", text, re.S)
-    assert blocks, "the README shows no Python"
+    assert blocks, f"{page} shows no Python"
     monkeypatch.chdir(tmp_path)
     (tmp_path / "data").symlink_to(PROJECT / "data")
     for block in blocks:
-        exec(compile(block, "README.md", "exec"), {"__name__": "readme"})
+        exec(compile(block, page, "exec"), {"__name__": "page"})
+
+
+def pages() -> list[Path]:
+    """Every Markdown page that belongs to the project."""
+    folders = [PROJECT, *(PROJECT / f for f in ("docs", "fits", "tests", "data", "notebooks"))]
+    deep = [p for folder in folders[1:] for p in folder.rglob("*.md")]
+    return sorted([*PROJECT.glob("*.md"), *deep])
+
+
+def test_links_of_the_pages_lead_somewhere():
+    dead = [
+        f"{page.relative_to(PROJECT)}: {link}"
+        for page in pages()
+        for link in re.findall(r"\]\(([^)#\s]+)", page.read_text())
+        if "://" not in link and not (page.parent / link).exists()
+    ]
+    assert not dead
+
+
+def test_only_pictures_that_a_page_shows_are_committed():
+    listed = subprocess.run(["git", "ls-files", "fits"], cwd=PROJECT, capture_output=True, text=True, check=False)
+    if listed.returncode:
+        pytest.skip("no git checkout: which files are committed can't be told")
+    files = [PROJECT / line for line in listed.stdout.splitlines()]
+    shown = {
+        (page.parent / link).resolve() for page in pages() for link in re.findall(r"\]\(([^)#\s]+)", page.read_text())
+    }
+    loose = [str(p.relative_to(PROJECT)) for p in files if p.suffix in (".png", ".svg") and p.resolve() not in shown]
+    assert not loose, f"show them on a page or leave them to `tissuejax study`: {loose}"
+    assert not [p for p in files if p.suffix == ".html"], "pages are written again by `tissuejax study`"
 
 
 def test_no_registry_host_and_no_machine_path_in_the_project_files():
