@@ -9,7 +9,7 @@ imported by its path, `from tissuejax.energies.strain import Strain`.
 
 import importlib
 
-VERBS = ("catalogue", "diagnose", "fit", "material", "read", "sensitivity", "write")
+VERBS = ("catalogue", "compare", "diagnose", "fit", "material", "read", "sensitivity", "write")
 NOUNS = {
     "Channel": "recordings.recording",
     "Diagnosis": "diagnosis.result",

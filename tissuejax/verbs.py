@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 jax.config.update("jax_enable_x64", True)
 
-__all__ = ["catalogue", "diagnose", "fit", "material", "read", "sensitivity", "write"]
+__all__ = ["catalogue", "compare", "diagnose", "fit", "material", "read", "sensitivity", "write"]
 
 
 def catalogue() -> dict[str, type[Energy]]:
@@ -168,6 +168,21 @@ def diagnose(
     from tissuejax.diagnosis.diagnose import diagnose as run
 
     return run(data, energy, holdout=holdout, **options)
+
+
+def compare(*fits: Fit):
+    """Fits of the same recordings side by side: AIC, BIC, Akaike weights, held-out error; see `fitting.comparison`.
+
+    Raises:
+        InputError: none, or fits of different data.
+    """
+    from tissuejax.fitting.comparison import compare as compared
+    from tissuejax.fitting.comparison import name_of
+
+    records = [found.record() for found in fits]
+    labels = [name_of(record) for record in records]
+    labels = [name if labels.count(name) == 1 else f"{name} ({i})" for i, name in enumerate(labels, start=1)]
+    return compared(dict(zip(labels, records, strict=True)), None, dict(zip(labels, fits, strict=True)))
 
 
 def write(found: "Fit | Diagnosis", out: str | os.PathLike) -> dict[str, Path]:

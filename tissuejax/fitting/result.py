@@ -10,6 +10,7 @@ import numpy as np
 
 from tissuejax.energies.catalogue import forms_of, name_of
 from tissuejax.energies.stability import Stability
+from tissuejax.fitting.fingerprint import fingerprint
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.scores import Score
 from tissuejax.fitting.uncertainty import Uncertainty
@@ -113,6 +114,7 @@ class Fit:
             "effects": [effect.name for effect in model.effects],
             "method": self.method,
             "recordings": list(self.problem.predictor.names),
+            "data": fingerprint(self.problem),
             "parameters": {
                 path: {
                     "value": float(value),
