@@ -94,6 +94,9 @@ def test_published_materials_by_name():
     third = published("in-vivo-3")
     assert third.values["energy.C40"] == 122.701
     assert third.volumetric.bulk_modulus(third.volumetric_constants) == 2000.0
+    x = 0.07  # sum_i (J - 1)^(2i) / D_i with four equal D (eq. 4.19) is a geometric series
+    energy = third.volumetric.energy(third.volumetric_constants, 1 + x)
+    assert energy == pytest.approx(1e3 * x**2 * (1 - x**8) / (1 - x**2), rel=1e-12)
     with pytest.raises(InputError, match="Did you mean 'in-vivo-"):
         published("in-vivo-4")
 

@@ -111,9 +111,10 @@ PUBLISHED: dict[str, Published] = {
             "reduced-polynomial-4",
             {"C10": 781.898, "C20": -747.631, "C30": 426.135, "C40": 122.701},
             "Lister 2012, table 2.3 (in vivo 3) and appendix A",
-            volumetric_name="compressibility-1",
-            volumetric_constants={"D1": 1e-3},
-            note="D is 1e-3 1/Pa in the code of appendix A, which gives its gravity cube, but 1e-4 in section 3.2.1",
+            volumetric_name="compressibility-4",
+            volumetric_constants={f"D{i}": 1e-3 for i in (1, 2, 3, 4)},
+            note="D1 = D2 = D3 = D4 (eq. 4.19): 1e-3 1/Pa in the code of appendix A, which gives the gravity cube of "
+            "4.3.3, but 1e-4 in section 3.2.1",
         ),
     )
 }
