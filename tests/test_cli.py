@@ -1,11 +1,13 @@
 """The command line: every command teaches, answers in JSON, and refuses with one sentence and exit code 2."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from tissuejax.cli import commands, main
+from tissuejax.cli import commands, listed, main
 
 ROOT = Path(__file__).parents[1]
 ELASTIC = str(ROOT / "data" / "demo" / "elastic.h5")
@@ -163,3 +165,23 @@ def test_the_demo_fits_fails_to_fit_and_finds_out_why(capsys, tmp_path):
     assert found["after"]["holdout"]["nominal_stress"]["chi2_per_sample"] < 1.2
     for name in ("elastic", "relaxing", "diagnosis"):
         assert (tmp_path / name / "report.html").stat().st_size > 50_000
+
+
+def test_help_and_the_bare_package_bring_no_jax_along():
+    said = "import sys, tissuejax.cli as c; c.parser('x'); print('jax' in sys.modules, 'numpy' in sys.modules)"
+    told = subprocess.run([sys.executable, "-c", said], capture_output=True, text=True, check=True)
+    assert told.stdout.split() == ["False", "False"]
+
+
+def test_commands_listed_without_importing_are_those_there_are():
+    assert [(c.name, c.summary, c.order) for c in listed()] == [
+        (c.name, c.summary, c.order) for c in commands().values()
+    ]
+
+
+def test_inspecting_brings_no_plots_along():
+    said = (
+        "import sys, tissuejax.commands.inspecting; print('matplotlib' in sys.modules, 'scipy.signal' in sys.modules)"
+    )
+    told = subprocess.run([sys.executable, "-c", said], capture_output=True, text=True, check=True)
+    assert told.stdout.split() == ["False", "False"]

@@ -5,19 +5,20 @@ else.
 """
 
 import argparse
+import ast
+import importlib
 import json
 import os
 import sys
 from collections.abc import Sequence
 from importlib import metadata
-
-import jax
+from pathlib import Path
+from typing import NamedTuple
 
 from tissuejax import commands as package
 from tissuejax.commands.command import Command
 from tissuejax.errors import TissueError
 from tissuejax.families import members
-from tissuejax.storage import plain
 
 TEACHES = """
 tissuejax identifies the mechanics of soft tissue from recordings, by gradients through the model.
@@ -35,21 +36,56 @@ def commands() -> dict[str, Command]:
     return {kind.name: kind() for kind in sorted(found, key=lambda k: (k.order, k.name))}
 
 
-def parser() -> argparse.ArgumentParser:
-    """The whole command line."""
+class Listed(NamedTuple):
+    """What the list of commands says of one, and the module it lives in."""
+
+    name: str
+    summary: str
+    order: int
+    module: str
+
+
+def listed() -> list[Listed]:
+    """All sub-commands in the order of the help, read from the syntax of their files and not imported.
+
+    A command brings JAX and the whole package along; the list of them should come at once. That is why name, summary
+    and order of a command are literals.
+    """
+    found = []
+    for path in sorted(Path(package.__path__[0]).glob("*.py")):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if not isinstance(node, ast.ClassDef):
+                continue
+            said = {
+                line.target.id: ast.literal_eval(line.value)
+                for line in node.body
+                if isinstance(line, ast.AnnAssign) and line.value is not None and line.target.id in Listed._fields
+            }
+            if "name" in said:
+                module = f"{package.__name__}.{path.stem}"
+                found.append(Listed(said["name"], said["summary"], said.get("order", Command.order), module))
+    return sorted(found, key=lambda c: (c.order, c.name))
+
+
+def parser(only: str | None = None) -> argparse.ArgumentParser:
+    """The whole command line, or the list of commands with the arguments of one.
+
+    Args:
+        only: the command whose arguments are wanted, None for all; of the others no module is imported.
+    """
     top = argparse.ArgumentParser(
         prog="tissuejax", description=TEACHES, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    try:
-        version = metadata.version("tissuejax")
-    except metadata.PackageNotFoundError:
-        version = "not installed"
-    top.add_argument("--version", action="version", version=f"tissuejax {version}")
+    top.add_argument("--version", action=Version, nargs=0, help="show the version and exit")
     below = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for name, command in commands().items():
+    for entry in listed():
+        if only is not None and entry.name != only:
+            below.add_parser(entry.name, help=entry.summary)
+            continue
+        command = _command(entry)
         sub = below.add_parser(
-            name,
-            help=command.summary,
+            entry.name,
+            help=entry.summary,
             description=command.teaches.strip("\n"),
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
@@ -58,12 +94,41 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
+class Version(argparse.Action):
+    """Prints the installed version; looked up when asked for."""
+
+    def __call__(self, parser, namespace, values, option_string=None):
+        try:
+            version = metadata.version("tissuejax")
+        except metadata.PackageNotFoundError:
+            version = "not installed"
+        print(f"tissuejax {version}")
+        parser.exit()
+
+
+def _command(entry: Listed) -> Command:
+    module = importlib.import_module(entry.module)
+    return next(
+        member()
+        for member in vars(module).values()
+        if isinstance(member, type) and issubclass(member, Command) and getattr(member, "name", None) == entry.name
+    )
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
+    argv = list(sys.argv[1:] if argv is None else argv)
+    known = {entry.name: entry for entry in listed()}
+    first = next((word for word in argv if not word.startswith("-")), "")
+    given = parser(first).parse_args(argv)
+
+    import jax  # after the parser, so that help and a mistyped option answer at once
+
+    from tissuejax.storage import plain
+
     jax.config.update("jax_enable_x64", True)
-    given = parser().parse_args(argv)
     try:
-        reply = commands()[given.command].run(given)
+        reply = _command(known[given.command]).run(given)
     except TissueError as error:
         if given.json:
             print(json.dumps({"status": "error", "error": str(error), "exit_code": error.exit_code}))

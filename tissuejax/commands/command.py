@@ -5,8 +5,6 @@ import argparse
 from dataclasses import dataclass
 from typing import ClassVar
 
-import equinox as eqx
-
 
 @dataclass(frozen=True)
 class Reply:
@@ -23,7 +21,7 @@ class Reply:
     code: int = 0
 
 
-class Command(eqx.Module):
+class Command(abc.ABC):
     """One sub-command. A new one is a new file in this folder.
 
     Class data:
@@ -31,6 +29,8 @@ class Command(eqx.Module):
         summary: one line for the list of commands.
         teaches: what it does, when to use it, with examples; shown by `tissuejax NAME --help`.
         order: place in the list.
+
+    Name, summary and order are literals: the list of commands is read from the files without importing them.
     """
 
     name: ClassVar[str]

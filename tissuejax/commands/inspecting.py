@@ -10,7 +10,6 @@ from tissuejax.commands.command import Command, Reply
 from tissuejax.recordings.files import names, read
 from tissuejax.recordings.recording import Recording, Sample
 from tissuejax.recordings.remarks import remarks
-from tissuejax.report.page import write_figures
 from tissuejax.report.scales import display
 
 
@@ -50,7 +49,11 @@ what is wrong with a file.
             return Reply({"samples": known}, text)
         sample = read(given.file)
         record = described(sample)
-        written = write_figures(sample, given.out) if given.out else {}
+        written = {}
+        if given.out:
+            from tissuejax.report.page import write_figures  # it brings every plot along; the text comes without
+
+            written = write_figures(sample, given.out)
         record["files"] = {name: str(path) for name, path in written.items()}
         return Reply(record, "\n".join([*text_of(record), *(f"figure {p}" for p in written.values())]))
 

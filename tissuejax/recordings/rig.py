@@ -6,7 +6,6 @@ watches its side; a load cell gives force, a circuit the moment of contact. SI t
 
 import numpy as np
 from jaxtyping import Float
-from scipy import signal
 
 from tissuejax.errors import InputError
 from tissuejax.recordings.checks import increasing
@@ -67,6 +66,8 @@ def lowpass(
             f"lowpass: cutoff {cutoff:g} Hz at {rate:g} samples a second; expected above 0, below {rate / 2:g} Hz"
         )
     corner = np.tan(np.pi * cutoff / rate) / (np.sqrt(2.0) - 1.0) ** (1.0 / (2 * order))
+    from scipy import signal  # half of what importing this room would cost
+
     sos = signal.butter(order, np.arctan(corner) / np.pi * 2, output="sos")
     pad = 3 * (2 * len(sos) + 1)
     even = np.allclose(np.diff(time), step, rtol=1e-3)
