@@ -9,6 +9,8 @@ imported by its path, `from tissuejax.energies.strain import Strain`.
 
 import importlib
 
+from tissuejax.cache import source as _source  # noqa: F401  hashes the code before any of it is loaded
+
 VERBS = ("catalogue", "compare", "diagnose", "fit", "material", "read", "sensitivity", "write")
 NOUNS = {
     "Channel": "recordings.recording",

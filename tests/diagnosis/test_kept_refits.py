@@ -4,9 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from spring_bench import spring
 
+from tissuejax.cache import source
 from tissuejax.diagnosis import kept_refits
 from tissuejax.diagnosis.diagnose import diagnose
+from tissuejax.diagnosis.kept_refits import KeptRefits
+from tissuejax.diagnosis.misfit import Misfit, white
 from tissuejax.diagnosis.search import Budget
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
@@ -69,6 +73,38 @@ def test_what_was_kept_of_another_sample_is_not_taken(tmp_path, counted):
     with pytest.raises(KeyboardInterrupt):
         diagnose(sample(31.0), out=tmp_path, **QUICK)
     assert counted["run"] == 1
+
+
+def test_what_was_kept_counts_only_for_the_same_question(tmp_path, monkeypatch):
+    """Code, physics, data, noise level, noise model, start and options: each makes another refit."""
+
+    def asked(told="physics", noise=None, start=None, change=None, **options) -> int:
+        bench = spring({}, names=("r1", "r2"), held_out=())
+        monkeypatch.setattr(bench, "told", lambda: told)
+        if change:
+            change(bench)
+        misfit = white(bench) if noise is None else Misfit(bench, {"force": noise})
+        kept = KeptRefits(bench, tmp_path)
+        kept.refit(misfit, (), start or {}, **options)
+        return kept.found
+
+    def scaled(name):
+        return lambda bench: setattr(bench, name, 1.1 * getattr(bench, name))
+
+    assert asked() == 0
+    assert asked() == 1
+    assert asked(told="other physics") == 0
+    assert asked(told=None) == 0
+    assert asked(change=scaled("y")) == 0
+    assert asked(change=scaled("sigma")) == 0
+    assert asked(start={"a": 6.0}) == 0
+    assert asked(iterations=4) == 0
+    assert asked(seed=np.zeros((800, 2))) == 0
+    assert asked(seed=np.full((800, 2), 1e-9)) == 0
+    with monkeypatch.context() as edited:
+        edited.setattr(source, "LOADED", "another formula")
+        assert asked() == 0
+    assert asked() == 1
 
 
 def test_a_search_ends_when_its_budget_is_spent_and_says_so():

@@ -1,9 +1,12 @@
 """The bench of probings on a small box: what needs no run, what is run once, and a shift that is found again."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.probing.bench import VALUES, measured, recording, sample
+from tissuejax.cache import source
 from tissuejax.diagnosis import probing_free
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.probing import ProbingBench
@@ -136,11 +139,29 @@ def test_mesh_step_and_penalty_are_told_apart(bench):
     assert found.amplitudes["step"] >= 0, "no recording was made slower than life"
 
 
-def test_a_stopped_diagnosis_finds_its_runs_again(pressed_too_deep, tmp_path):
+def test_a_stopped_diagnosis_finds_its_runs_again(pressed_too_deep, tmp_path, monkeypatch):
     first = bench_of(pressed_too_deep, tmp_path / "runs")
     told = first.predict(VALUES)
     again = bench_of(pressed_too_deep, tmp_path / "runs")
     assert np.array_equal(again.predict(VALUES), told)
     assert again.runs.count == 0
+    key = again.runs._key(VALUES, "a", FINE)
+    assert again.runs._path(key).exists()
+    others = [
+        sample(recording("a", depth=3.1e-3), recording("b", place=(-0.004, 0.004), depth=2.5e-3)),
+        sample(recording("a", radius=8.1e-3), recording("b", place=(-0.004, 0.004), depth=2.5e-3)),
+        Sample(TWO.name, TWO.recordings, geometry=TWO.geometry, density=1.01 * TWO.density),
+        Sample(TWO.name, TWO.recordings, replace(TWO.geometry, points=1.01 * TWO.geometry.points), TWO.density),
+    ]
+    for other in others:  # with the same measurements: y alone tells none of them apart
+        measured_alike = {
+            n: replace(r, channels=pressed_too_deep.recordings[n].channels) for n, r in other.recordings.items()
+        }
+        changed = bench_of(replace(other, recordings=measured_alike), tmp_path / "runs")
+        assert np.array_equal(changed.y, again.y)
+        assert not changed.runs._path(key).exists()
+    with monkeypatch.context() as edited:
+        edited.setattr(source, "LOADED", "another formula")
+        assert not again.runs._path(key).exists()
     again.runs.forget()
     assert not (tmp_path / "runs").exists()

@@ -14,7 +14,7 @@ from tests.probing.bench import BODY, QUICK, VALUES, measured, model, recording,
 from tissuejax.effects.catalogue import suited
 from tissuejax.errors import InputError
 from tissuejax.experiments.predictor import predictor
-from tissuejax.fitting.probed import fit_probed
+from tissuejax.fitting.probed import Checkpoint, fit_probed
 from tissuejax.fitting.setup import problem
 from tissuejax.fitting.stress_curve import fit_stress_curve
 from tissuejax.recordings.recording import Geometry, Sample
@@ -90,6 +90,32 @@ def test_an_interrupted_fit_goes_on_from_its_last_accepted_values(tmp_path, stop
         assert rest.simulations["jacobian"] < whole.simulations["jacobian"]
     assert rest.fit.values["energy.C10"] == pytest.approx(whole.fit.values["energy.C10"], rel=1e-3)
     assert not kept.exists()
+
+
+def test_what_was_kept_of_another_question_is_not_taken(tmp_path):
+    """Mesh, probe, noise, priors, fixed values: a fit of anything else begins at its own start."""
+    path, one = tmp_path / "checkpoint.json", sample()
+    deeper, wider = recording(depth=3.1e-3), recording(radius=8.1e-3)
+    moved = Geometry(BODY.points * 1.01, BODY.cells, BODY.cell_type, BODY.fixed)
+
+    def asked(given=one, settings=QUICK, fix=KNOWN, **options):
+        return problem(predictor(model(), given, settings=settings), start=START, fix=fix, **options)
+
+    Checkpoint(path, asked()).keep({"energy.C10": 555.0})
+    assert Checkpoint(path, asked()).values()["energy.C10"] == 555.0
+    others = [
+        asked(sample(deeper)),
+        asked(sample(wider)),
+        asked(sample(geometry=moved)),
+        asked(sample(density=1010.0)),
+        asked(settings=replace(QUICK, penalty=4e8)),
+        asked(fix=KNOWN | {"energy.C20": 310.0}),
+        asked(priors={"energy.C10": (500.0, 50.0)}),
+        asked(bounds={"energy.C10": (0.0, 900.0)}),
+        asked(weights={"force": 0.004, "markers": 6e-5}),
+        asked(loss="cauchy"),
+    ]
+    assert [Checkpoint(path, other).values()["energy.C10"] for other in others] == [800.0] * len(others)
 
 
 @pytest.mark.slow

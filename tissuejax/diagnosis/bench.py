@@ -158,9 +158,10 @@ class Bench(abc.ABC):
         """Other values to start from that recordings may allow as well as `values` (another direction)."""
         return ()
 
-    def told(self) -> str:
-        """All that a prediction depends on beside the parameters, as text: what is kept of it carries its hash."""
-        return ""
+    def told(self) -> str | None:
+        """All that a prediction depends on beside the parameters, as text (`cache.key.described`): what is kept of it
+        carries its hash. None where that can't be told in full: then nothing is kept."""
+        return None
 
     def burden(self, keys: Sequence[str]) -> int:
         """How many searches and memories a prediction with these candidates nests; sets of many are not tried."""

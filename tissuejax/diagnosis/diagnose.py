@@ -9,7 +9,7 @@ import jax
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tissuejax.cache import keep_programs
+from tissuejax.cache.programs import keep_programs
 from tissuejax.diagnosis.decide import decide
 from tissuejax.diagnosis.foreseen import OPEN, foreseen
 from tissuejax.diagnosis.kept_refits import KeptRefits

@@ -1,22 +1,22 @@
 """Finished refits kept on disk, so that a stopped diagnosis of material tests goes on where it was.
 
-A refit is decided by the measurements, the model, the noise and where it starts; their hash is its name. A diagnosis
-that is started again asks for the same refits in the same order and finds them; if a setting or a sample has changed
-it asks for others. A line of JSON each in one file, appended when the refit is finished: numbers come back to the last
-bit, and a line that was cut off when the program was stopped is passed over.
+A refit is decided by the code, the measurements, the model, the noise and where it starts; their hash is its name. A
+diagnosis that is started again asks for the same refits in the same order and finds them; if a formula, a setting or a
+sample has changed it asks for others. Of a model with a law from a user's script, whose formula is not part of that
+hash, nothing is kept. A line of JSON each in one file, appended when the refit is finished: numbers come back to the
+last bit, and a line that was cut off when the program was stopped is passed over.
 """
 
-import hashlib
 import json
 import os
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
+from tissuejax.cache.key import described, key
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.misfit import Misfit
 from tissuejax.diagnosis.refit import Refit, refit
@@ -39,6 +39,12 @@ class KeptRefits:
         self._known: dict[str, dict] = {}
         if folder is None:
             return
+        parts = (bench.fitted, bench.held_out, bench.start, bench.free, bench.candidates, bench.segments)
+        told = bench.told()
+        self._told = None if told is None else described((told, parts, bench.y, bench.sigma))
+        if self._mark() is None:
+            self.folder = None
+            return
         try:
             folder.mkdir(parents=True, exist_ok=True)
             lines = (folder / FILE).read_text().splitlines() if (folder / FILE).exists() else []
@@ -50,19 +56,17 @@ class KeptRefits:
                 self._known[one.pop("mark")] = one
             except (json.JSONDecodeError, KeyError):
                 continue
-        said = [version(p) for p in ("tissuejax", "jax", "numpy", "scipy")]
-        said += [bench.fitted, bench.held_out, bench.start, bench.free, bench.candidates, bench.told()]
-        said += [(s.recording, s.rows, s.time.tobytes(), s.drive.tobytes()) for s in bench.segments]
-        self._mark = hashlib.sha256(repr(said).encode() + bench.y.tobytes() + bench.sigma.tobytes())
+
+    def _mark(self, *asked: object) -> str | None:
+        return None if self._told is None else key(self._told, asked)
 
     def refit(self, misfit: Misfit, keys: Sequence[str], start: Mapping[str, float], **options) -> Refit:
         """`refit.refit`, or what it gave before; `options` are its keywords."""
         if self.folder is None:
             return refit(self._bench, misfit, keys, start, **options)
-        noises = {c: (n.share, n.rho) for c, n in misfit.noises.items()}
-        mark = self._mark.copy()
-        mark.update(repr((noises, tuple(keys), sorted(start.items()), sorted(options.items()))).encode())
-        name = mark.hexdigest()[:32]
+        name = self._mark(misfit.noises, tuple(keys), sorted(start.items()), sorted(options.items()))
+        if name is None:  # the code has moved since it was loaded
+            return refit(self._bench, misfit, keys, start, **options)
         if name in self._known:
             self.found += 1
             self._bench.spent += self._known[name]["spent"]

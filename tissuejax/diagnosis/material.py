@@ -18,7 +18,8 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Array, Float
 
-from tissuejax.cache import Kept
+from tissuejax.cache.key import described
+from tissuejax.cache.programs import Kept
 from tissuejax.diagnosis.bench import Bench, Candidate, Free, Segment
 from tissuejax.diagnosis.catalogue import Entry, Sizes, entries
 from tissuejax.diagnosis.periodogram import lines
@@ -59,19 +60,7 @@ def compiled(model: Model) -> Callable[[Float[Array, " p"], MaterialTest], Float
     def predicted(theta: Float[Array, " p"], test: MaterialTest) -> Float[Array, "n ..."]:
         return nominal_stress(model, dict(zip(model.declared, theta)), test)
 
-    return Kept(predicted, told(model))
-
-
-def told(model: Model) -> str | None:
-    """A model as text, by which its programs are found again; None if that doesn't tell all.
-
-    The text of a law holds its name and its numbers, not its formula: of laws outside this package, whose source is
-    not part of what programs are kept by, it doesn't tell all.
-    """
-    parts = (model.energy, *model.effects, *((model.volumetric,) if model.volumetric is not None else ()))
-    own = all(type(part).__module__.startswith("tissuejax.") for part in parts)
-    text = repr((*(f"{type(part).__module__}.{type(part).__qualname__}" for part in parts), model))
-    return text if own and "<" not in text else None
+    return Kept(predicted, described(model))
 
 
 def lengthened(test: MaterialTest) -> MaterialTest:
@@ -168,11 +157,9 @@ class MaterialBench(Bench):
         angles = [(2 * k + 1) * np.pi / 8 for k in range(4)]
         return [fresh | {p: a if p.endswith("angle") else 0.4 for p in paths} for a in angles]
 
-    def told(self) -> str:
+    def told(self) -> str | None:
         """See `Bench.told`."""
-        tests = {n: [np.asarray(getattr(t, f)) for f in t.__dataclass_fields__] for n, t in self._tests.items()}
-        arrays = {n: [a.tobytes() if a.dtype != object else str(a) for a in row] for n, row in tests.items()}
-        return repr((self._energy, [e.effect for e in self._entries], arrays))
+        return described((self._energy, self._entries, self._tests))
 
     def _declare(self, energy: Energy, found: list[Entry]) -> None:
         recordings = (*self.fitted, *self.held_out)

@@ -5,7 +5,6 @@ together in groups (few programs), and values of an effect whose amplitudes are 
 was stopped and is started again asks for the same runs in the same order and finds them on disk.
 """
 
-import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +12,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from tissuejax.cache.key import described
+from tissuejax.cache.key import key as key_of
 from tissuejax.diagnosis.bench import Segment
 from tissuejax.diagnosis.probing_series import picked
 from tissuejax.effects.effect import Effect
@@ -59,7 +60,7 @@ class Runs:
     count: int = 0
     _known: dict[tuple, np.ndarray] = field(default_factory=dict)
     _models: dict[tuple, ProbingPredictor] = field(default_factory=dict)
-    _mark: str = ""
+    _told: str | None = None  # mesh, path and radius of the probe, sensors, effects, settings: all a run depends on
 
     def __post_init__(self):
         one = self.ready[FINE]
@@ -68,8 +69,8 @@ class Runs:
             for n in one.names
             for own in [[s for s in self.segments if s.recording == n]]
         }
-        told = repr((one.model, [(k, p.settings) for k, p in self.ready.items()], list(self.effects)))
-        self._mark = hashlib.sha256(told.encode() + self.y.tobytes()).hexdigest()
+        ready = {k: (p.model, p.settings, p.setups) for k, p in self.ready.items()}
+        self._told = described((ready, self.effects, self.segments, self.y, self.finite))
 
     def many(self, asked: Sequence[Asked]) -> list[Float[np.ndarray, " N"]]:
         """Predictions, one long vector each: as measured where a recording wasn't asked for, NaN where a run failed."""
@@ -132,9 +133,10 @@ class Runs:
         return np.full_like(out, np.nan) if int(run.failed) >= 0 else out
 
     def _path(self, key: tuple) -> Path | None:
-        if self.folder is None:
+        if self.folder is None or self._told is None:
             return None
-        return self.folder / f"{hashlib.sha256((self._mark + repr(key)).encode()).hexdigest()[:32]}.npy"
+        name = key_of(self._told, key)  # None where the code has moved since it was loaded
+        return None if name is None else self.folder / f"{name}.npy"
 
     def _find(self, key: tuple) -> bool:
         path = self._path(key)

@@ -6,6 +6,7 @@ from importlib.metadata import version
 
 import numpy as np
 
+from tissuejax.cache import source
 from tissuejax.diagnosis.decide import Verdict
 from tissuejax.diagnosis.locate import Located, locate
 from tissuejax.diagnosis.refit import Refit
@@ -71,7 +72,8 @@ class Diagnosis:
             "energy": self.energy,
             "warnings": list(bench.warnings),
             "seconds": self.seconds,
-            "versions": {name: version(name) for name in ("tissuejax", "jax", "numpy", "scipy")},
+            "versions": {name: version(name) for name in ("tissuejax", "jax", "numpy", "scipy")}
+            | {"source": source.LOADED},
         }
 
     def numerical(self, r: Refit) -> dict | None:

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from tissuejax.cache import keep_programs
+from tissuejax.cache.programs import keep_programs
 from tissuejax.errors import UnstableSimulation, unknown
 from tissuejax.experiments import programs, workers
 from tissuejax.experiments.homogeneous import local

@@ -18,8 +18,10 @@ from typing import Any
 
 import jax
 
+from tissuejax.cache import source
 from tissuejax.experiments import programs
 
+CODE = "TISSUEJAX_CODE"  # hash of the code that asks: a worker with another one does nothing for it
 Job = tuple[Any, ...]  # function, static, arguments: as `programs.run` takes them
 
 
@@ -38,6 +40,7 @@ class Worker:
             "XLA_FLAGS": flags,
             "JAX_ENABLE_X64": double,
             "JAX_PLATFORMS": "cpu",
+            CODE: source.LOADED,
         }
         self.process = subprocess.Popen(
             [sys.executable, "-m", "tissuejax.experiments.workers"],
@@ -114,8 +117,10 @@ def run_all(jobs: Sequence[Job], processes: int, do: Callable = programs.run) ->
 
 def serve_pipe() -> None:
     """The worker's side: jobs from standard input, results to standard output; prints go to the error stream."""
-    from tissuejax.cache import keep_programs
+    from tissuejax.cache.programs import keep_programs
 
+    if os.environ.get(CODE, source.LOADED) != source.LOADED:
+        sys.exit("tissuejax was changed since the calculation began: its simulations go on in one process")
     keep_programs()
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)

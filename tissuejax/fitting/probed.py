@@ -6,7 +6,6 @@ the last derivatives. Standard errors hold two parts: noise, and how far the est
 are changed (a linear shift: the change of the prediction through the Jacobian).
 """
 
-import hashlib
 import json
 import time
 from collections.abc import Callable, Mapping
@@ -17,6 +16,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax import storage
+from tissuejax.cache import key
 from tissuejax.errors import InputError
 from tissuejax.experiments.probing_predictor import ProbingPredictor, make_ready
 from tissuejax.fitting.advice import warnings_of
@@ -234,9 +234,9 @@ def vector_errors(problem: Problem, residuals: Float[np.ndarray, " n"]) -> dict[
     """Root mean square length of the error vectors by recording and channel, SI (Lister 2012, eq. 2.2, 2.3, corrected:
     the mean over the samples summed)."""
     found: dict[str, dict[str, float]] = {}
-    for key, rows in problem.rows.items():
-        error = residuals[rows] * problem.sigma(key)
-        found.setdefault(key[0], {})[key[1]] = float(np.sqrt(3 * np.mean(error**2)))
+    for (recording, channel), rows in problem.rows.items():
+        error = residuals[rows] * problem.sigma((recording, channel))
+        found.setdefault(recording, {})[channel] = float(np.sqrt(3 * np.mean(error**2)))
     return found
 
 
@@ -270,9 +270,12 @@ class Checkpoint:
         self.path, self.problem = (None if path is None else Path(path)), problem
         self.before: dict[str, dict[str, float]] = {}  # errors at the very start
         self.closing = False  # the swift descent had ended already
-        parts = (problem.predictor.model, problem.predictor.names, problem.free, problem.predictor.settings)
-        numbers = [problem.measured[k].tobytes() for k in problem.channels]
-        self.mark = hashlib.sha256(repr(parts).encode() + b"".join(numbers)).hexdigest()
+        p = problem.predictor
+        fixed = {path: float(value) for path, value in problem.start.items() if path not in problem.free}
+        aims = (problem.free, fixed, problem.noise, problem.bounds, problem.priors, problem.loss, problem.stiffness)
+        self.mark = key.key(p.model, p.names, p.settings, p.setups, aims, problem.measured)
+        if self.mark is None:  # a law from elsewhere, or code that has moved since it was loaded
+            self.path = None
 
     def values(self) -> dict[str, float]:
         """Where to begin: the kept values if they are of this problem, else its start."""

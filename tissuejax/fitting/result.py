@@ -8,6 +8,7 @@ from importlib import metadata
 import jax
 import numpy as np
 
+from tissuejax.cache import source
 from tissuejax.energies.catalogue import forms_of, name_of
 from tissuejax.energies.stability import Stability
 from tissuejax.fitting.fingerprint import fingerprint
@@ -161,7 +162,7 @@ def described(model: Model) -> dict:
 
 
 def versions() -> dict[str, str]:
-    """Versions that a number may depend on."""
+    """Versions that a number may depend on; "source" is the hash of this package's code as it was loaded."""
     names = ("tissuejax", "jax", "optimistix", "optax", "diffrax", "numpy", "scipy")
     found = {"python": platform.python_version(), "float": str(jax.dtypes.canonicalize_dtype(float))}
     for name in names:
@@ -169,4 +170,5 @@ def versions() -> dict[str, str]:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             found[name] = "not installed"
+    found["source"] = source.LOADED
     return found

@@ -5,10 +5,9 @@ Environment: TISSUEJAX_CACHE names the folder ("" or "off" switches it off); def
 
 import hashlib
 import os
-import platform
+import stat
+import warnings
 from collections.abc import Callable
-from functools import lru_cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ import jax
 import numpy as np
 from jax import export
 
+from tissuejax.cache.key import key as key_of
 from tissuejax.errors import InputError
 from tissuejax.storage import write_bytes
 
@@ -24,7 +24,6 @@ WORTHWHILE = 0.3  # s of compilation from which a program is kept
 TRACED = "traced"  # subfolder of what tracing gave
 MARK = 32  # bytes of a hash
 MOST = 1000  # files kept there, of a tenth of a megabyte each
-LIBRARIES = ("jax", "jaxlib", "numpy", "equinox", "diffrax", "optimistix", "lineax")  # that a trace passes through
 
 
 def folder() -> Path | None:
@@ -42,11 +41,32 @@ def keep_programs() -> None:
     if where is None or jax.config.jax_compilation_cache_dir is not None:
         return
     try:
-        where.mkdir(parents=True, exist_ok=True)
+        where.mkdir(parents=True, exist_ok=True, mode=0o700)
     except OSError:  # a read-only home: compile again each time
+        return
+    if not own(where):
         return
     jax.config.update("jax_compilation_cache_dir", str(where))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", WORTHWHILE)
+
+
+def own(where: Path) -> bool:
+    """Whether a folder is this user's and nobody else may write there; says so once where it isn't.
+
+    A kept program is code: whoever can write the folder could have this user run another one.
+    """
+    if not hasattr(os, "getuid") or not where.exists():
+        return True
+    seen = where.stat()
+    if seen.st_uid == os.getuid() and not seen.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return True
+    whose = "belongs to another user" if seen.st_uid != os.getuid() else "may be written by others"
+    warnings.warn(
+        f"{where} {whose}, so no compiled programs are kept or taken there: `chmod go-w` it, or name another folder "
+        f"in {ENVIRONMENT}",
+        stacklevel=3,
+    )
+    return False
 
 
 class Kept:
@@ -92,10 +112,10 @@ class Kept:
 
     def _path(self, key: str) -> Path | None:
         where = jax.config.jax_compilation_cache_dir
-        if self._said is None or where is None or "://" in where:
+        if self._said is None or where is None or "://" in where or not own(Path(where)):
             return None
-        name = hashlib.sha256("\n".join((_circumstances(), _settings(), self._said, key)).encode()).hexdigest()
-        return Path(where) / TRACED / f"{name}.bin"
+        name = key_of(self._said, key)
+        return None if name is None else Path(where) / TRACED / f"{name}.bin"
 
 
 def _read(path: Path) -> export.Exported | None:
@@ -122,20 +142,3 @@ def _keep(path: Path, content: bytes) -> None:
             old.unlink(missing_ok=True)
     except (InputError, OSError):
         return
-
-
-@lru_cache(maxsize=1)
-def _circumstances() -> str:
-    """All that a trace depends on beside its function: this package's source, and the libraries it passes through."""
-    root = Path(__file__).parent
-    source = hashlib.sha256()
-    for path in sorted(root.rglob("*.py")):
-        source.update(f"{path.relative_to(root)}\n".encode() + path.read_bytes())
-    libraries = [f"{name} {version(name)}" for name in LIBRARIES]
-    return "\n".join([source.hexdigest(), platform.python_version(), *libraries])
-
-
-def _settings() -> str:
-    """JAX's settings that change a trace."""
-    c = jax.config
-    return repr((c.jax_enable_x64, c.jax_debug_nans, c.jax_default_matmul_precision, jax.default_backend()))
