@@ -17,7 +17,8 @@ from typing import NamedTuple
 
 from tissuejax import commands as package
 from tissuejax.commands.command import Command
-from tissuejax.errors import TissueError
+from tissuejax.commands.sentences import Parser, sentence
+from tissuejax.errors import InputError, TissueError
 from tissuejax.families import members
 
 TEACHES = """
@@ -73,9 +74,7 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
     Args:
         only: the command whose arguments are wanted, None for all; of the others no module is imported.
     """
-    top = argparse.ArgumentParser(
-        prog="tissuejax", description=TEACHES, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    top = Parser(prog="tissuejax", description=TEACHES, formatter_class=argparse.RawDescriptionHelpFormatter)
     top.add_argument("--version", action=Version, nargs=0, help="show the version and exit")
     below = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for entry in listed():
@@ -119,30 +118,38 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
     argv = list(sys.argv[1:] if argv is None else argv)
     known = {entry.name: entry for entry in listed()}
-    first = next((word for word in argv if not word.startswith("-")), "")
-    given = parser(first).parse_args(argv)
-
-    import jax  # after the parser, so that help and a mistyped option answer at once
-
-    from tissuejax.storage import plain
-
-    jax.config.update("jax_enable_x64", True)
+    name = next((word for word in argv if not word.startswith("-")), "")
     try:
+        given = parser(name).parse_args(argv)
+
+        import jax  # after the parser, so that help and a mistyped option answer at once
+
+        jax.config.update("jax_enable_x64", True)
         reply = _command(known[given.command]).run(given)
     except TissueError as error:
-        if given.json:
-            print(json.dumps({"status": "error", "error": str(error), "exit_code": error.exit_code}))
-        print(f"tissuejax {given.command}: {error}", file=sys.stderr)
-        return error.exit_code
+        return _refused(name, error, "--json" in argv)
+    except OSError as error:
+        if isinstance(error, ConnectionError):  # a pipe to a worker of ours: a fault, not the user's
+            raise
+        return _refused(name, InputError(sentence(error)), "--json" in argv)
     except KeyboardInterrupt:
-        print(f"tissuejax {given.command}: stopped", file=sys.stderr)
+        print(f"tissuejax {name}: stopped", file=sys.stderr)
         return 130
+    from tissuejax.storage import plain
+
     try:
         print(json.dumps(plain(reply.record), indent=2, ensure_ascii=False) if given.json else reply.text)
         sys.stdout.flush()
     except BrokenPipeError:  # the reader (head, less) has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return reply.code
+
+
+def _refused(name: str, error: TissueError, as_json: bool) -> int:
+    if as_json:
+        print(json.dumps({"status": "error", "error": str(error), "exit_code": error.exit_code}))
+    print(f"tissuejax {name}".strip() + f": {error}", file=sys.stderr)
+    return error.exit_code
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ Every writer works on a temporary file in the same folder and renames it into pl
 file system), so that a reader, a second run or an interruption never meets half a result.
 """
 
+import errno
 import json
 import math
 import os
@@ -27,7 +28,8 @@ def replacing(path: str | os.PathLike) -> Iterator[Path]:
         InputError: the folder can't be made or written.
     """
     path = Path(path)
-    temporary = path.with_name(f".{secrets.token_hex(6)}.{path.name}")
+    # Only the ending is kept: a long name must not get longer.
+    temporary = path.with_name(f".{secrets.token_hex(6)}{''.join(path.suffixes[-2:])[-12:]}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
@@ -35,8 +37,24 @@ def replacing(path: str | os.PathLike) -> Iterator[Path]:
             os.replace(temporary, path)
         finally:
             temporary.unlink(missing_ok=True)
-    except (PermissionError, NotADirectoryError, IsADirectoryError, FileExistsError) as error:
-        raise InputError(f"{path}: can't be written ({error.strerror}); name another output file or folder") from error
+    except OSError as error:
+        if isinstance(error, ConnectionError):
+            raise
+        raise InputError(f"{_shown(path)}: can't be written ({_why(error)})") from error
+
+
+def _shown(path: Path) -> str:
+    """A path for a message; a name that is too long for a file is too long for a sentence too."""
+    text = str(path)
+    return text if len(text) <= 200 else f"{text[:100]}...{text[-40:]}"
+
+
+def _why(error: OSError) -> str:
+    if error.errno in (errno.ENOSPC, errno.EDQUOT) or "No space left" in str(error):
+        return "the disk is full; make room or name an output folder on another disk"
+    if error.errno == errno.ENAMETOOLONG:
+        return "its name is too long; give a shorter name"
+    return f"{error.strerror or error}; name another output file or folder"
 
 
 def write_bytes(path: str | os.PathLike, content: bytes) -> Path:

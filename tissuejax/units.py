@@ -1,10 +1,11 @@
 """Units at the edge: text units become SI numbers when a file is read, and only there (pint does the work).
 
 to_si(3.2, "kPa", "Pa")          # 3200.0
-quantity("30 mm", "m")           # 0.03
+quantity("30 mm", "m")           # 0.03, and so is "30mm"
 """
 
 import functools
+import re
 
 import numpy as np
 from jaxtyping import Float
@@ -44,6 +45,31 @@ def _registry():
     return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
 
 
+_SPELLED = (
+    ("µ", "u"),
+    ("μ", "u"),
+    ("²", "^2"),
+    ("³", "^3"),
+    ("·", "*"),
+    ("⋅", "*"),
+    ("°C", "degC"),
+    ("°", "deg"),
+    ("sec.", "s"),
+)
+_QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(1(?:\s*/.*)?|[^\d\s,.].*)?")
+
+
+def spelled(unit: str) -> str:
+    """A unit as machines write it ("(mm)", "[N/mm2]", "µN·m") in the spelling that pint reads ("mm", "N/mm^2", ...)."""
+    text = unit.strip()
+    if text[:1] in ("(", "[") and text[-1:] in (")", "]"):
+        text = text[1:-1].strip()
+    for machine, plain in _SPELLED:
+        text = text.replace(machine, plain)
+    text = re.sub(r"(?<=[A-Za-z])\.(?=[A-Za-z])", "*", text)
+    return re.sub(r"(?<=[A-Za-z])([23])\b", r"^\1", text)
+
+
 @functools.cache
 def factor(unit: str, si: str) -> float:
     """The number that turns a value in `unit` into one in `si` (an SI unit, or "1").
@@ -54,7 +80,7 @@ def factor(unit: str, si: str) -> float:
     import pint
 
     try:
-        given = _registry().Quantity(1.0, _registry().parse_units(unit.strip().replace("µ", "u")))
+        given = _registry().Quantity(1.0, _registry().parse_units(spelled(unit)))
     except Exception as error:  # pint's parser raises many kinds, tokenize's own among them
         raise unknown(f"unit (wanted is one that converts to {si!r})", unit, KNOWN) from error
     try:
@@ -77,20 +103,25 @@ def to_si(value: Float[np.ndarray, "..."] | float, unit: str, si: str) -> Float[
 
 
 def quantity(text: str | float, si: str, what: str = "value") -> float:
-    """A number with its unit, such as "30 mm", in `si`; a bare number is taken only where `si` is "1".
+    """A number with its unit, such as "30 mm" or "30mm", in `si`; a bare number is taken only where `si` is "1".
+
+    Args:
+        text: the number and its unit.
+        si: the unit wanted.
+        what: what messages call it, e.g. the option that it was given to.
 
     Raises:
         InputError: no number, no unit, an unknown unit or one of another dimension.
     """
-    number, unit = text, "1"
-    if isinstance(text, str):
-        number, _, unit = text.strip().partition(" ")
-        if not unit and number.endswith("%"):
-            number, unit = number[:-1], "%"
-    try:
-        number = float(number)
-    except (TypeError, ValueError):
-        raise InputError(f'{what} = {text!r}: wanted is a number and a unit, such as "12.5 {si}"') from None
-    if unit.strip() in ("", "1") and si != "1":
+    if isinstance(text, bool) or not isinstance(text, str | int | float):
+        raise InputError(f'{what} = {text!r}: wanted is a number and a unit, such as "12.5 {si}"')
+    found = _QUANTITY.fullmatch(text.strip()) if isinstance(text, str) else None
+    if isinstance(text, str) and found is None:
+        raise InputError(f'{what} = {text!r}: wanted is a number and a unit, such as "12.5 {si}"')
+    number, unit = (float(found[1]), found[2] or "1") if found else (float(text), "1")
+    if unit.strip() == "1" and si != "1":
         raise InputError(f'{what} = {text!r} has no unit: write a number and a unit, such as "{number:g} {si}"')
-    return to_si(number, unit or "1", si)
+    try:
+        return to_si(number, unit, si)
+    except InputError as error:
+        raise InputError(f"{what} = {text!r}: {error}") from error

@@ -126,9 +126,12 @@ def number(text: str, parameter: Parameter, what: str) -> float:
     """A number in the parameter's SI unit, or with a unit of its own."""
     text = text.strip()
     try:
-        return float(text)
+        value = float(text)
     except ValueError:
         return quantity(text, parameter.unit, what)
+    if math.isnan(value):
+        raise InputError(f"{what}: found no number, wanted is one, such as 12.5 {parameter.unit}")
+    return value
 
 
 def positive(value: int, option: str) -> int:

@@ -15,6 +15,22 @@ def refusal(file: object, item: str, found: str, expected: str, advice: str = ""
     return InputError(f"{file}: {item}: found {found}, expected {expected}.{' ' if advice else ''}{advice}")
 
 
+LONGEST = 120  # letters of a name: it becomes a file name, with an ending and a folder before it
+
+
+def named(name: str, file: object, what: str) -> None:
+    """Refuse a name that can't stand in one line: too long or with control characters; of a sample, which names files
+    too, also one of blanks and dots alone.
+    """
+    if what == "sample" and not name.strip(". "):
+        raise refusal(file, f"name of a {what}", repr(name), "a name with a letter or a digit in it")
+    if not name.isprintable():
+        raise refusal(file, f"name of a {what}", f"{name[:60]!r}", "a name without line breaks and control characters")
+    if len(name) > LONGEST:
+        found = f"{len(name)} letters ({name[:40]!r}...)"
+        raise refusal(file, f"name of a {what}", found, f"at most {LONGEST}", "Give it a shorter name.")
+
+
 def finite(values: Float[np.ndarray, "..."], file: object, item: str, nan_allowed: bool = False) -> None:
     """Refuse NaN and infinities (`nan_allowed`: infinities alone), naming the first and how many there are."""
     bad = np.isinf(values) if nan_allowed else ~np.isfinite(values)

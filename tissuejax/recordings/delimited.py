@@ -83,7 +83,7 @@ def load(
     Raises:
         InputError: an empty file, no rows, a row with too few or too many cells (with its line), binary content.
     """
-    rows = _lines(path)[skip:]
+    rows = text_lines(path)[skip:]
     kept = [
         (skip + i + 1, row) for i, row in enumerate(rows) if row.strip() and not (comment and row.startswith(comment))
     ]
@@ -107,7 +107,12 @@ def load(
     return Columns(path, {n: cells[:, i] for i, n in enumerate(names)}, np.array([line for line, _ in body]), decimal)
 
 
-def _lines(path: Path) -> list[str]:
+def text_lines(path: Path) -> list[str]:
+    """The lines of a text file, gzip or plain, whichever of UTF-16, UTF-8, cp1252 and latin-1 decodes it.
+
+    Raises:
+        InputError: an empty file, damaged gzip, binary content.
+    """
     content = path.read_bytes()
     if not content:
         raise InputError(f"{path}: found an empty file, expected a table of columns")

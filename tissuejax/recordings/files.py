@@ -8,12 +8,14 @@ The format is chosen by the content of a file, then by its ending; a new format 
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 import tissuejax.recordings as folder
 from tissuejax.errors import InputError, unknown
 from tissuejax.families import members
+from tissuejax.recordings import checks
 from tissuejax.recordings.format import Format
 from tissuejax.recordings.hdf5_writing import write
 from tissuejax.recordings.recording import Sample
@@ -29,7 +31,13 @@ def formats() -> dict[str, Format]:
 def names(path: str | os.PathLike) -> list[str]:
     """The names of the samples in a file, in file order."""
     path, chosen = _split(path)
-    return [chosen] if chosen else _format(path).names(path)
+    if chosen:
+        return [chosen]
+    with _readable(path):
+        known = _format(path).names(path)
+    for name in known:
+        checks.named(name, path, "sample")
+    return known
 
 
 def read(path: str | os.PathLike, name: str | None = None) -> Sample:
@@ -45,8 +53,9 @@ def read(path: str | os.PathLike, name: str | None = None) -> Sample:
     """
     path, chosen = _split(path)
     name = name or chosen
-    kind = _format(path)
-    known = kind.names(path)
+    with _readable(path):
+        kind = _format(path)
+        known = kind.names(path)
     if name is None:
         if len(known) > 1:
             first = ", ".join(known[:8]) + (", ..." if len(known) > 8 else "")
@@ -56,14 +65,37 @@ def read(path: str | os.PathLike, name: str | None = None) -> Sample:
         name = known[0]
     if name not in known:
         raise InputError(f"{path}: {unknown('sample', name, known)}")
-    return kind.read(path, name)
+    return _one(kind, path, name)
 
 
 def read_all(path: str | os.PathLike) -> dict[str, Sample]:
     """Every sample of a file by name, in file order."""
     path, chosen = _split(path)
-    kind = _format(path)
-    return {name: kind.read(path, name) for name in ([chosen] if chosen else kind.names(path))}
+    with _readable(path):
+        kind = _format(path)
+        known = [chosen] if chosen else kind.names(path)
+    return {name: _one(kind, path, name) for name in known}
+
+
+def _one(kind: Format, path: Path, name: str) -> Sample:
+    with _readable(path):
+        sample = kind.read(path, name)
+    checks.named(sample.name, path, "sample")
+    for recording in sample.recordings:
+        checks.named(recording, path, "recording")
+    return sample
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    """What the operating system refuses becomes one sentence about the file."""
+    try:
+        yield
+    except OSError as error:
+        name = error.filename or path
+        raise InputError(
+            f"{name}: can't be read ({error.strerror or error}); check its rights and its disk, or name another file"
+        ) from error
 
 
 def _split(path: str | os.PathLike) -> tuple[Path, str | None]:
@@ -78,7 +110,7 @@ def _format(path: Path) -> Format:
     known: Mapping[str, Format] = formats()
     what = "; ".join(f"{name} ({', '.join(f.endings)})" for name, f in known.items())
     if not path.exists():
-        near = sorted(p.name for p in path.parent.glob(f"*{path.suffix}"))[:8] if path.parent.is_dir() else []
+        near = sorted(p.name for p in path.parent.glob(f"[!.]*{path.suffix}"))[:8] if path.parent.is_dir() else []
         there = f" In {path.parent} there are: {', '.join(near)}." if near else ""
         raise InputError(f"{path}: no such file.{there}")
     if path.is_dir():
