@@ -1,0 +1,95 @@
+"""Sixty-six real samples whose cause is known from the protocol, and nineteen with none: is it named, and what else?
+
+Every line of `causes.toml` is diagnosed as a user would: base energy named, one recording held out where there are
+several, all effects of the catalogue allowed. One file a sample under `results/`; a stopped study goes on. Then tables.
+
+tissuejax study fits/real-panel
+PANEL_ONLY=beef,rubber tissuejax study fits/real-panel      protocols of these keys alone
+"""
+
+import json
+import os
+import sys
+import time
+import tomllib
+import traceback
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import panel_page
+import panel_samples
+
+import tissuejax as tj
+from tissuejax.challenge.panel import answered, read_causes, summary
+from tissuejax.progress import for_terminal
+from tissuejax.storage import write_json
+
+KEPT = (
+    "verdict",
+    "confidence",
+    "reasons",
+    "effects",
+    "best_attempt",
+    "alternatives",
+    "explained",
+    "rest",
+    "warnings",
+    "fitted",
+    "held_out",
+    "before",
+    "after",
+    "probabilities",
+)
+
+
+def file_of(folder: Path, name: str) -> Path:
+    """Where the result of a sample lies."""
+    return folder / "results" / f"{''.join(c if c.isalnum() else '-' for c in name)}.json"
+
+
+def diagnosed(entry: panel_samples.Entry) -> dict:
+    """What the diagnosis says of one sample; a failure is an answer too."""
+    begun = time.perf_counter()
+    try:
+        sample, held = panel_samples.build(entry)
+        found = tj.diagnose(sample, entry.energy, holdout=held, ogden_form=entry.ogden_form).as_dict()
+        record = {k: found[k] for k in KEPT if k in found}
+    except Exception as error:
+        trace = traceback.format_exc().splitlines()[-6:]
+        record = {"verdict": "failed", "effects": [], "error": f"{type(error).__name__}: {error}", "trace": trace}
+    return {"id": entry.id, "energy": entry.energy, **record, "seconds": time.perf_counter() - begun}
+
+
+def main(folder: Path) -> str:
+    """Diagnose what has no result yet, grade all that has one; returns the answer in a sentence."""
+    causes, words = read_causes(folder / "causes.toml")
+    listed = panel_samples.entries(tomllib.loads((folder / "causes.toml").read_text()))
+    wanted = [k for k in os.environ.get("PANEL_ONLY", "").split(",") if k]
+    part, parts = (int(n) for n in os.environ.get("PANEL_PART", "0/1").split("/"))  # two processes share the work
+    left = [e for e in listed if not file_of(folder, e.id).exists() and (not wanted or e.key in wanted)][part::parts]
+    with for_terminal().stage(f"diagnosing {len(left)} samples", len(left)) as stage:
+        for entry in left:
+            if not file_of(folder, entry.id).exists():
+                write_json(file_of(folder, entry.id), diagnosed(entry))
+            stage.advance(note=entry.id)
+    answers = []
+    for cause in causes:
+        if (path := file_of(folder, cause.id)).exists():
+            answers.append(answered(cause, json.loads(path.read_text()), words))
+    if not answers:
+        return "no sample has been diagnosed yet"
+    found = {"listed": len(causes), "answered": len(answers), **summary(answers)}
+    write_json(folder / "result.json", found)
+    panel_page.write(folder, answers, found)
+    named, nulls = (found["rates"][k] for k in ("cause named and no wrong name", "nulls: a wrong physical name"))
+    said = f"{found['answered']} of {found['listed']} samples"
+    if named["of"]:
+        said += f"; cause named without a wrong name in {named['share']:.0%} of {named['of']}"
+    if nulls["of"]:
+        said += f"; a wrong physical name on {nulls['share']:.0%} of {nulls['of']} nulls"
+    return said
+
+
+if __name__ == "__main__":
+    print(main(Path(__file__).parent))
