@@ -4,6 +4,7 @@ import importlib
 import inspect
 import pkgutil
 from types import ModuleType
+from typing import Any
 
 from tissuejax.errors import unknown
 
@@ -18,10 +19,11 @@ def members(package: ModuleType, kind: type) -> dict[str, type]:
     Raises:
         RuntimeError: two members share one name.
     """
-    found: dict[str, type] = {}
+    found: dict[str, Any] = {}
     for info in sorted(pkgutil.iter_modules(package.__path__), key=lambda i: i.name):
         module = importlib.import_module(f"{package.__name__}.{info.name}")
-        for _, member in inspect.getmembers(module, inspect.isclass):
+        declared: list[tuple[str, Any]] = inspect.getmembers(module, inspect.isclass)
+        for _, member in declared:
             if member.__module__ != module.__name__ or not issubclass(member, kind) or inspect.isabstract(member):
                 continue
             if not hasattr(member, "name"):  # shared by some members, itself none

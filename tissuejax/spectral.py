@@ -23,7 +23,7 @@ import numpy as np
 from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 
-from tissuejax.tensors import Sym, double_dot
+from tissuejax.tensors import Sym, double_dot, total
 
 SWEEPS = 4  # quadratic convergence: 4 reach float64 round-off (tests, also at widely spread eigenvalues)
 CLOSE = 0.1  # below this spread of ln(eigenvalue) second divided differences are integrated
@@ -53,7 +53,7 @@ def _prepared(C: Sym, exponents: tuple[Array, ...]) -> tuple[Sym, Array]:
     """One dtype and shape for the components, and the exponents along a new first axis (less for the compiler)."""
     kind = jnp.result_type(*C, *exponents, float)
     C = Sym(*jnp.broadcast_arrays(*(jnp.asarray(c, dtype=kind) for c in C)))
-    exponents = [jnp.asarray(s, dtype=kind) for s in exponents]
+    exponents = tuple(jnp.asarray(s, dtype=kind) for s in exponents)
     one_each = all(s.ndim == 0 for s in exponents)
     shape = (1,) * C.xx.ndim if one_each else C.xx.shape
     return C, jnp.stack([jnp.broadcast_to(s, shape) for s in exponents])
@@ -72,7 +72,7 @@ def _f(m: int, s: Array, x: Array) -> Array:
 def _traces(m: int, C: Sym, s: Float[Array, "k ..."]) -> Float[Array, "k ..."]:
     """tr C^s ln(C)^m."""
     values, _ = _eigensystem(C)
-    return sum(_f(m, s, x) for x in values)
+    return total(_f(m, s, x) for x in values)
 
 
 @partial(_traces.defjvp, symbolic_zeros=True)
@@ -137,7 +137,7 @@ def _second_derivative(m: int, C: Sym, s: Float[Array, "k ..."], H: Sym, K: Sym)
     triples = itertools.combinations_with_replacement(range(3), 3)
     f = {triple: _second(m, s, *(values[q] for q in triple)) for triple in triples}
     frame = {
-        (i, j): sum(f[tuple(sorted((i, n, j)))] * (h[i, n] * k[n, j] + k[i, n] * h[n, j]) for n in range(3))
+        (i, j): total(f[_ordered(i, n, j)] * (h[i, n] * k[n, j] + k[i, n] * h[n, j]) for n in range(3))
         for i, j in UPPER
     }
     return _assemble(vectors, frame)
@@ -215,8 +215,9 @@ def _rotation(A: Sym, v: tuple[Vector, ...]) -> tuple[Sym, tuple[Vector, ...]]:
     s = t * c
     xx, yy = A.xx - t * A.xy, A.yy + t * A.xy
     xz, yz = c * A.xz - s * A.yz, s * A.xz + c * A.yz
-    x = tuple(c * a - s * b for a, b in zip(v[0], v[1]))
-    y = tuple(s * a + c * b for a, b in zip(v[0], v[1]))
+    (x0, x1, x2), (y0, y1, y2) = v[0], v[1]
+    x = (c * x0 - s * y0, c * x1 - s * y1, c * x2 - s * y2)
+    y = (s * x0 + c * y0, s * x1 + c * y1, s * x2 + c * y2)
     return Sym(xx=yy, yy=A.zz, zz=xx, xy=yz, xz=jnp.zeros_like(t), yz=xz), (y, v[2], x)
 
 
@@ -240,11 +241,16 @@ def _added(A: Sym, B: Sym, factor: Array | float = 1.0) -> Sym:
     return Sym(*(a + b * factor for a, b in zip(A, B)))
 
 
+def _ordered(i: int, j: int, k: int) -> tuple[int, int, int]:
+    a, b, c = sorted((i, j, k))
+    return a, b, c
+
+
 def _assemble(v: tuple[Vector, ...], frame: dict[tuple[int, int], Array]) -> Sym:
     """sum_ij frame_ij v_i v_j^T, frame given by its upper triangle (absent entries are zero)."""
 
     def entry(k: int, l: int) -> Array:
-        return sum(
+        return total(
             x * (v[i][k] * v[i][l] if i == j else v[i][k] * v[j][l] + v[j][k] * v[i][l]) for (i, j), x in frame.items()
         )
 
@@ -255,5 +261,5 @@ def _in_eigenframe(v: tuple[Vector, ...], H: Sym) -> dict[tuple[int, int], Array
     """v_i . H v_j for all i, j."""
     rows = ((H.xx, H.xy, H.xz), (H.xy, H.yy, H.yz), (H.xz, H.yz, H.zz))
     Hv = [tuple(sum(h * x for h, x in zip(row, vj)) for row in rows) for vj in v]
-    frame = {(i, j): sum(x * y for x, y in zip(v[i], Hv[j])) for i in range(3) for j in range(i, 3)}
+    frame = {(i, j): total(x * y for x, y in zip(v[i], Hv[j])) for i in range(3) for j in range(i, 3)}
     return frame | {(j, i): h for (i, j), h in frame.items()}

@@ -12,6 +12,7 @@ import secrets
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
@@ -80,11 +81,11 @@ def write_npz(path: str | os.PathLike, arrays: Mapping[str, np.ndarray]) -> Path
     """Write named arrays as a compressed npz atomically; returns the path (ending .npz)."""
     path = Path(path) if str(path).endswith(".npz") else Path(f"{path}.npz")
     with replacing(path) as temporary:
-        np.savez_compressed(temporary, **{name: np.asarray(array) for name, array in arrays.items()})
+        np.savez_compressed(temporary, **cast(Any, {name: np.asarray(array) for name, array in arrays.items()}))
     return path
 
 
-def write_figure(path: str | os.PathLike, figure: object, **options: object) -> Path:
+def write_figure(path: str | os.PathLike, figure: Any, **options: Any) -> Path:
     """Save a figure (anything with `savefig`) atomically, in the format its ending names; `options` go to it."""
     with replacing(path) as temporary:
         figure.savefig(temporary, **options)

@@ -5,10 +5,18 @@ row. Keeping components apart (element axis last) is what lets XLA vectorise ove
 serves a single material point with scalars.
 """
 
+import operator
+from collections.abc import Iterable
+from functools import reduce
 from typing import NamedTuple
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
+
+
+def total(terms: Iterable[Array]) -> Array:
+    """The sum of at least one array; unlike `sum` it begins with the first and not with the integer 0."""
+    return reduce(operator.add, terms)
 
 
 class Sym(NamedTuple):
@@ -55,5 +63,5 @@ def determinant(c: Sym) -> Float[Array, "..."]:
 
 
 def right_cauchy_green(F: Float[Array, "... 3 3"]) -> Sym:
-    """C = F^T F (source 4.3.2 prints F F^T; see source-facts)."""
+    """C = F^T F (Lister 2012, 4.3.2 prints F F^T, a slip)."""
     return Sym.from_matrix(jnp.swapaxes(F, -1, -2) @ F)

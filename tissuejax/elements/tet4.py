@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from tissuejax.elements.element import Element, Forces, Tensor, determinant, inverse, largest_eigenvalue
+from tissuejax.tensors import total
 
 
 class Reference(NamedTuple):
@@ -38,7 +39,7 @@ class Tet4(Element):
 
     def gradient(self, reference: Reference, u: Float[Array, "3 4 E"]) -> tuple[Tensor, Any]:
         d, B = u[:, 1:] - u[:, :1], reference.gradient
-        H = sum(d[:, a][:, None] * B[a][None] for a in range(3))
+        H = total(d[:, a][:, None] * B[a][None] for a in range(3))
         return H + jnp.eye(3, dtype=H.dtype)[:, :, None], ()
 
     def forces(self, reference: Reference, P: Tensor, memory: Any, stiffness: Float[Array, " E"]) -> Forces:

@@ -5,7 +5,7 @@ A name is a member of the family, with its order where it has one: `neo-hookean`
 """
 
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 from tissuejax import energies as package
 from tissuejax.energies.energy import Energy
@@ -73,7 +73,8 @@ def entries() -> dict[str, Entry]:
     lines = {}
     for name, example in examples().items():
         if "+" in name:
-            typed, declared = example.name, example.parameters[len(example.matrix.parameters) :]
+            matrix = cast(Any, example).matrix  # an addition is written "+name" and wraps a matrix
+            typed, declared = example.name, example.parameters[len(matrix.parameters) :]
         else:
             typed, declared = re.sub(r"-\d+$", "-N", name), example.parameters
         lines[typed] = Entry(typed, example.formula, declared, example.shear_modulus, example.valid, example.source)
@@ -91,15 +92,17 @@ def examples(ogden_form: str = "2mu/alpha^2", order: int = 2) -> dict[str, Energ
 
 def name_of(energy: Energy | Volumetric) -> str:
     """The name under which the catalogue gives this energy, e.g. "ogden-3+fibre"."""
-    if hasattr(energy, "matrix"):
-        return name_of(energy.matrix) + energy.name
-    return f"{energy.name}-{energy.order}" if hasattr(energy, "order") else energy.name
+    matrix, order = getattr(energy, "matrix", None), getattr(energy, "order", None)
+    if matrix is not None:
+        return name_of(matrix) + energy.name
+    return energy.name if order is None else f"{energy.name}-{order}"
 
 
 def forms_of(energy: Energy, volumetric: Volumetric | None = None) -> dict[str, str]:
     """Every choice of form that the constants depend on, for files and reports: {"ogden": ..., "volumetric": ...}."""
     matrix = getattr(energy, "matrix", energy)
-    forms = {"ogden": matrix.form} if hasattr(matrix, "form") else {}
+    form = getattr(matrix, "form", None)
+    forms = {} if form is None else {"ogden": form}
     return forms | {"volumetric": volumetric.formula if volumetric else "incompressible"}
 
 

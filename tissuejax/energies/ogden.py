@@ -5,7 +5,7 @@ The source prints two and means a third (see source-facts), so there is no defau
 """
 
 from collections.abc import Callable, Mapping
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -14,12 +14,13 @@ from tissuejax.energies.energy import Energy
 from tissuejax.energies.strain import Strain
 from tissuejax.errors import InputError, unknown
 from tissuejax.parameters import Parameter
+from tissuejax.tensors import total
 
 
 class Form(NamedTuple):
     """One convention for Ogden constants: psi = sum_i factor(alpha_i) mu_i (sum lbar^alpha_i - 3)."""
 
-    factor: Callable[[Array], Array]
+    factor: Callable[[Any], Any]  # of an exponent, a number or an array
     shear_modulus: str
     used_by: str
 
@@ -99,10 +100,10 @@ class Ogden(Energy):
     def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
         terms = self._terms(p)
         sums = strain.power_sums(tuple(alpha for _, alpha in terms))
-        return sum(f * (total - 3) for (f, _), total in zip(terms, sums))
+        return total(f * (powers - 3) for (f, _), powers in zip(terms, sums))
 
     def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
-        return sum(0.5 * f * alpha**2 for f, alpha in self._terms(p))
+        return total(0.5 * f * alpha**2 for f, alpha in self._terms(p))
 
     def _terms(self, p: Mapping[str, Array]) -> list[tuple[Array, Array]]:
         """(f_i, alpha_i); an exponent at 0, where f_i has a pole that the sum cancels, is moved to 1e-6."""

@@ -1,7 +1,7 @@
 """Polynomial in both invariants, any order; order 1 is Mooney-Rivlin."""
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from jaxtyping import Array, Float
 
@@ -39,9 +39,9 @@ class Polynomial(Energy):
 
     def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
         x, y = strain.I1 - 3, strain.I2 - 3
-        psi = 0.0
+        psi: Any = 0.0
         for i in range(self.order, -1, -1):  # Horner in x with, inside, Horner in y
-            inner = 0.0
+            inner: Any = 0.0
             for j in range(self.order - i, 0 if i == 0 else -1, -1):
                 inner = inner * y + p[f"C{i}{j}"]
             psi = psi * x + (inner * y if i == 0 else inner)

@@ -1,7 +1,7 @@
 """Reduced polynomial in I1, any order; order 1 is neo-Hookean in C10, order 3 is Yeoh."""
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from jaxtyping import Array, Float
 
@@ -33,7 +33,7 @@ class ReducedPolynomial(Energy):
 
     def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
         x = strain.I1 - 3
-        psi = 0.0
+        psi: Any = 0.0
         for i in range(self.order, 0, -1):  # Horner: one multiplication a term
             psi = (psi + p[f"C{i}0"]) * x
         return psi

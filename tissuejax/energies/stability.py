@@ -8,6 +8,7 @@ and enters a fit as a constraint or a penalty.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -108,7 +109,7 @@ def penalty(energy: Energy, p: Mapping[str, Array], stretches: Mapping[str, Floa
     Args:
         stretches: by path, the stretches that must be stable. Differentiable in `p`, once continuously.
     """
-    total = 0.0
+    total: Any = 0.0
     for path, stretch in stretches.items():
         size = jax.lax.stop_gradient(jnp.mean(jnp.abs(log_strain_tangent(energy, p, path, stretch))))
         unstable = jnp.maximum(-least_eigenvalue(energy, p, path, stretch) / jnp.where(size > 0, size, 1.0), 0.0)

@@ -25,7 +25,10 @@ def energy_density(
     """Psi = psi_iso(C) + U(J), Pa; `volumetric` None leaves U out (incompressible: pressure from elsewhere)."""
     strain = Strain.of(C)
     psi = energy.isochoric(p_energy, strain)
-    return psi if volumetric is None else psi + volumetric.energy(p_volumetric, strain.J)
+    if volumetric is None:
+        return psi
+    assert p_volumetric is not None, "a volumetric energy without its parameters"
+    return psi + volumetric.energy(p_volumetric, strain.J)
 
 
 def pk2_isochoric(energy: Energy, p: Values, C: Sym) -> Sym:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from tissuejax.energies.energy import Energy
@@ -25,7 +26,7 @@ def check_valid(energy: Energy, p: Mapping[str, Array], strain: Strain, where: s
     Raises:
         InputError: a strain outside, with how many and what the range is.
     """
-    if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves((dict(p), strain))):
+    if any(isinstance(x, Tracer) for x in jax.tree.leaves((dict(p), strain))):
         return
     margin = np.asarray(energy.margin(p, strain))
     bad = ~(margin > 0)  # NaN is bad too
@@ -38,7 +39,7 @@ def check_valid(energy: Energy, p: Mapping[str, Array], strain: Strain, where: s
         )
 
 
-def check_stretches(stretch: Float[Array, "..."], where: str = "stretch") -> None:
+def check_stretches(stretch: Float[Array, "..."] | np.ndarray, where: str = "stretch") -> None:
     """Nothing, if every stretch is finite and above 0.
 
     Raises:
@@ -63,7 +64,8 @@ def valid_stretches(
 
     if not inside(1.0):
         return float("nan"), float("nan")
-    return tuple(_last_inside(inside, end) for end in within)
+    low, high = within
+    return _last_inside(inside, low), _last_inside(inside, high)
 
 
 def _last_inside(inside, end: float) -> float:

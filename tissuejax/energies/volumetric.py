@@ -12,6 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.parameters import Parameter
+from tissuejax.tensors import total
 
 
 class Volumetric(eqx.Module):
@@ -83,7 +84,7 @@ class Compressibility(Volumetric):
         )
 
     def energy(self, p: Mapping[str, Array], J: Float[Array, "..."]) -> Float[Array, "..."]:
-        return sum((J - 1) ** (2 * i) / p[f"D{i}"] for i in range(1, self.order + 1))
+        return total((J - 1) ** (2 * i) / p[f"D{i}"] for i in range(1, self.order + 1))
 
     def bulk_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
         return 2 / p["D1"]
