@@ -58,7 +58,7 @@ class Predictor(eqx.Module):
 
     @abc.abstractmethod
     def jacobian(self, values: Values, paths: Sequence[str]) -> tuple[dict[str, Recording], Tangents]:
-        """The prediction, and its derivative by each of `paths` as [path][recording][channel], in forward mode."""
+        """The prediction, and its derivative by each of `paths` as `[path][recording][channel]`, in forward mode."""
 
     @abc.abstractmethod
     def of(self, names: Sequence[str]) -> "Predictor":
