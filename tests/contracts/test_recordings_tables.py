@@ -254,7 +254,7 @@ def test_gzip_and_windows_text(tmp_path):
 
 def test_a_table_finds_the_side_file_of_its_name(tmp_path):
     put(tmp_path)
-    with pytest.raises(InputError, match=r"t\.toml beside it.*t, l, P"):
+    with pytest.raises(InputError, match=r"t\.toml beside it.*`tissuejax import "):
         files.read(tmp_path / "t.csv")
     (tmp_path / "t.toml").write_text(UNI)
     assert list(files.read(tmp_path / "t.csv").recordings) == ["r1"]

@@ -1,51 +1,183 @@
-"""`tissuejax import`: a lab's own table, described by a side file, as a recording file."""
+"""`tissuejax import`: a lab's own file understood, as a side file that runs, or as a recording file."""
 
 import argparse
+import os
 from pathlib import Path
 from typing import ClassVar
 
 from tissuejax.commands.command import Command, Reply
 from tissuejax.errors import InputError
 from tissuejax.recordings.files import names, read, write
+from tissuejax.recordings.guessing import Guess, guessed
+from tissuejax.recordings.remarks import remarks
+from tissuejax.recordings.side_writing import side_text, template
+from tissuejax.storage import write_text
+
+SIZES = ("height", "diameter", "width", "thickness", "area", "radius")
 
 
 class Import(Command):
-    """Write a recording file (HDF5, version 1) from a table and its side file."""
+    """Look at a lab's own table and write its side file; or write recording files (HDF5) from a side file."""
 
     name: ClassVar[str] = "import"
-    order: ClassVar[int] = 25
-    summary: ClassVar[str] = "turn a lab's own CSV table into a recording file, by a small side file"
+    order: ClassVar[int] = 15
+    summary: ClassVar[str] = "your own CSV or machine export: guesses what it holds, writes a side file that runs"
     teaches: ClassVar[str] = """
-Turn a table (CSV, also compressed) into a recording file. SIDE.toml names the table and says what its columns mean:
-units, kind of experiment, specimen size, engineering or true quantities, sign. No code is needed; `fits/` holds
-examples for each real data set. A file with several samples writes one recording file each: give a folder, or pick
-one with SIDE.toml#NAME.
+Begin here with your own data.
 
-  tissuejax import fits/rubber/rubber.toml#Treloar_1944 treloar.h5
-  tissuejax import specimens.toml out/
+  tissuejax import my.csv                                  look at a table or raw export, write my.toml beside it
+  tissuejax import my.csv --experiment compression --height 10mm --diameter 25mm
+  tissuejax inspect my.toml --out look                     then: what is in it, with figures
+  tissuejax fit my.toml --energy neo-hookean
+
+The separator, decimal sign, encoding, key lines, row of units, the columns and the specimen sizes in the file are
+guessed; what was assumed is said, and stands as comments in the side file, which you can change. Raw exports of test
+machines, rheometers and indenters are recognised by their content.
+
+  tissuejax import --template tension                      an empty side file to fill in (also compression, planar,
+                                                           equibiaxial, biaxial, simple-shear, probing, probe)
+  tissuejax import my.toml my.h5                           a recording file (HDF5) from a side file
+  tissuejax import specimens.toml out/                     one recording file for each sample of it
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
-        """SIDE.toml and OUT."""
-        parser.add_argument("side", metavar="SIDE.toml", help="side file; SIDE.toml#NAME for one sample of many")
+        """FILE, OUT and what the user knows better than the guess."""
+        parser.add_argument("file", metavar="FILE", nargs="?", help="table, raw export, or side file (SIDE.toml#NAME)")
         parser.add_argument(
-            "out", metavar="OUT.h5", type=Path, help="recording file to write, or a folder for several samples"
+            "out",
+            metavar="OUT",
+            type=Path,
+            nargs="?",
+            help="side file (.toml) or recording file (.h5) to write, or folder",
         )
+        parser.add_argument("--template", metavar="KIND", help="print a side file to fill in, or write it to OUT")
+        parser.add_argument(
+            "--experiment", default="", metavar="KIND", help="tension, compression, biaxial, probing, ..."
+        )
+        parser.add_argument("--positive", choices=("tension", "compression"), default="", help="which counts positive")
+        parser.add_argument(
+            "--format", default="", metavar="NAME", help="the raw export's format, if it isn't recognised"
+        )
+        for size in SIZES:
+            parser.add_argument(f"--{size}", metavar="SIZE", help=f'{size} with its unit, e.g. "25mm"')
+        parser.add_argument("--force", action="store_true", help="overwrite what is there")
 
     def run(self, given: argparse.Namespace) -> Reply:
-        """Read every sample, write every file."""
-        known = names(given.side)
-        single = given.out.suffix in (".h5", ".hdf5")
-        if single and len(known) > 1:
-            raise InputError(
-                f"{given.side} holds {len(known)} samples, {given.out} is one file: give a folder, or "
-                f"{given.side}#{known[0]}"
-            )
-        written = {}
-        for name in known:
-            sample = read(given.side, name)
-            path = given.out if single else given.out / f"{name}.h5"
-            write(sample, path)
-            written[name] = {"file": str(path), "recordings": len(sample.recordings)}
-        text = "\n".join(f"{w['file']}: {name}, {w['recordings']} recordings" for name, w in written.items())
-        return Reply({"written": written}, text)
+        """Guess, or convert."""
+        if given.template is not None:
+            return _template(given)
+        if given.file is None:
+            raise InputError("found no FILE: give a table, a raw export or a side file, or --template KIND")
+        if given.file.partition("#")[0].lower().endswith((".toml", ".h5", ".hdf5", ".yaml", ".yml")):
+            return _converted(given)
+        return _guessed(given)
+
+
+def _template(given: argparse.Namespace) -> Reply:
+    text = template(given.template)
+    out = given.out or (Path(given.file) if given.file else None)
+    if out is None:
+        return Reply({"template": text}, text.rstrip())
+    _free(out, given.force)
+    return Reply({"template": text, "written": str(write_text(out, text))}, f"wrote {out}; fill it in, then inspect it")
+
+
+def _guessed(given: argparse.Namespace) -> Reply:
+    from tissuejax.recordings.side_file import experiment_of
+
+    path = Path(given.file)
+    _refuse_no_file(path)
+    kind, sense = experiment_of(given.experiment) if given.experiment else ("", "")
+    sizes = {size: getattr(given, size) for size in SIZES if getattr(given, size)}
+    guess = guessed(path, kind, given.positive or sense, sizes, given.format)
+    single = given.out is not None and given.out.suffix in (".h5", ".hdf5")
+    side = path.with_name(f"{_stem(path)}.toml") if given.out is None or single else given.out
+    if side.suffix != ".toml":
+        raise InputError(f"{side}: expected a side file (.toml) or a recording file (.h5) to write")
+    _free(side, given.force)
+    file = os.path.relpath(path, side.parent) if side.parent != path.parent else path.name
+    write_text(side, side_text(guess, file))
+    return _said(guess, side, given)
+
+
+def _said(guess: Guess, side: Path, given: argparse.Namespace) -> Reply:
+    lines = [f"{guess.path}: {guess.machine or 'a table'}", *(f"  assumed: {s}" for s in guess.said)]
+    record = {"side_file": str(side), "assumed": list(guess.said), "lacking": list(guess.lacking), "remarks": []}
+    if guess.lacking:
+        options = " ".join(f"--{name} ..." for name in guess.lacking)
+        lines += ["", f"wrote {side}, which still needs: {', '.join(guess.lacking)}. Write them into the lines marked"]
+        lines.append(f"FILL IN, or give them now: tissuejax import {guess.path} {options} --force")
+        return Reply(record, "\n".join(lines), 2)
+    for name in names(side):
+        sample = read(side, name)
+        for key, recording in sample.recordings.items():
+            spans = {k: v for k, v in recording.inputs.items() if "time" not in k}
+            spans |= {k: c.values for k, c in recording.channels.items()}
+            said = ", ".join(f"{k} {v.min():.4g} to {v.max():.4g}" for k, v in spans.items())
+            lines.append(f"  {name}, {key}: {recording.experiment}, {len(next(iter(spans.values())))} samples, {said}")
+        found = remarks(sample)
+        record["remarks"] += found
+        lines += [f"  note: {remark}" for remark in found]
+    lines += ["", f"wrote {side}"]
+    if given.out is not None and given.out.suffix in (".h5", ".hdf5"):
+        record |= _written(str(side), given.out, given.force)
+        lines.append(f"wrote {given.out}")
+    lines += [f"look   tissuejax inspect {side} --out look", f"fit    tissuejax fit {side} --energy neo-hookean"]
+    return Reply(record, "\n".join(lines))
+
+
+def _converted(given: argparse.Namespace) -> Reply:
+    if given.out is None:
+        raise InputError(
+            f"{given.file}: name what to write: a recording file, e.g. {Path(given.file).stem}.h5, or a folder"
+        )
+    known = names(given.file)
+    if given.out.suffix in (".h5", ".hdf5") and len(known) > 1:
+        raise InputError(
+            f"{given.file} holds {len(known)} samples, {given.out} is one file: give a folder, or "
+            f"{given.file}#{known[0]}"
+        )
+    if given.out.suffix not in (".h5", ".hdf5", "") and not given.out.is_dir():
+        raise InputError(f"{given.out}: expected a recording file (.h5) or a folder to write")
+    record = _written(given.file, given.out, given.force)
+    text = "\n".join(f"{w['file']}: {name}, {w['recordings']} recordings" for name, w in record["written"].items())
+    return Reply(record, text)
+
+
+def _written(file: str, out: Path, force: bool) -> dict:
+    single = out.suffix in (".h5", ".hdf5")
+    known = names(file)
+    targets = {name: out if single else out / f"{name}.h5" for name in known}
+    for path in targets.values():
+        _free(path, force)
+    written = {}
+    for name, path in targets.items():
+        sample = read(file, name)
+        write(sample, path)
+        written[name] = {"file": str(path), "recordings": len(sample.recordings)}
+    return {"written": written}
+
+
+def _free(path: Path, force: bool) -> None:
+    if path.exists() and not force:
+        raise InputError(f"{path}: is there already; name another file, or give --force to overwrite it")
+
+
+def _stem(path: Path) -> str:
+    name = path.name.removesuffix(".gz")
+    return name.rpartition(".")[0] or name
+
+
+def _refuse_no_file(path: Path) -> None:
+    """Refuse what isn't a readable file.
+
+    Raises:
+        InputError: no such file, a folder, an empty file.
+    """
+    if not path.exists():
+        near = sorted(p.name for p in path.parent.glob(f"[!.]*{path.suffix}"))[:8] if path.parent.is_dir() else []
+        raise InputError(f"{path}: no such file.{' There are: ' + ', '.join(near) + '.' if near else ''}")
+    if path.is_dir():
+        raise InputError(f"{path}: found a folder, expected a file")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: found an empty file, expected a table of columns")

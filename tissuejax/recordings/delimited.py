@@ -57,7 +57,9 @@ class Columns:
         except ValueError:
             if cell.strip().lower() in MISSING:
                 return np.nan
-            hint = "With decimal commas, set decimal = ','." if "," in cell else ""
+            hint = "With decimal commas, set decimal = ',' in the side file." if "," in cell else ""
+            if row == 0 and not re.search(r"\d", cell):
+                hint = "If this is a row of units, set units_row = true in the side file."
             place = f"line {self.lines[row]}, column {name!r}"
             raise refusal(self.path, place, repr(cell), "a number", hint) from None
 
@@ -69,6 +71,7 @@ def load(
     comment: str = "#",
     skip: int = 0,
     header: bool = True,
+    units_row: bool = False,
 ) -> Columns:
     """Read a delimited text file.
 
@@ -79,6 +82,7 @@ def load(
         comment: lines that begin with it are left out; "" for none.
         skip: lines before the header that are left out.
         header: whether the first line names the columns; otherwise they are called by their place, from 1.
+        units_row: whether a line of units stands under the names; it is left out.
 
     Raises:
         InputError: an empty file, no rows, a row with too few or too many cells (with its line), binary content.
@@ -92,7 +96,8 @@ def load(
     mark = SEPARATORS.get(separator or "", separator) or _guess(kept[0][1], decimal)
     split = [(line, _split(text, mark)) for line, text in kept]
     names = split[0][1] if header else [str(i + 1) for i in range(len(split[0][1]))]
-    body = split[1:] if header else split
+    names = [name or f"column {k + 1}" for k, name in enumerate(names)]
+    body = split[1 + bool(units_row) :] if header else split
     if len(set(names)) < len(names):
         twice = sorted({n for n in names if names.count(n) > 1})
         raise refusal(path, f"line {split[0][0]}", f"column names that come twice: {twice}", "each name once")
@@ -101,7 +106,10 @@ def load(
     for line, cells in body:
         if len(cells) != len(names):
             found = f"{len(cells)} cells"
-            advice = f"The separator read is {mark!r}; set `separator`, `skip` or `comment` if that is wrong."
+            advice = (
+                f"The separator read is {mark!r}; set `separator`, `skip` or `comment` in the side file if that is "
+                f"wrong, or let `tissuejax import {path.name}` find them."
+            )
             raise refusal(path, f"line {line}", found, f"{len(names)} as in line {split[0][0]}", advice)
     cells = np.array([cells for _, cells in body], dtype=object).reshape(len(body), len(names))
     return Columns(path, {n: cells[:, i] for i, n in enumerate(names)}, np.array([line for line, _ in body]), decimal)

@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tissuejax.errors import InputError, unknown
-from tissuejax.recordings.layouts import layout
+from tissuejax.recordings.exports.meanings import COLUMN_WORDS, EXPERIMENT_WORDS, SIZE_WORDS
+from tissuejax.recordings.layouts import LAYOUTS
+from tissuejax.recordings.selection import Selection, selection_from
 from tissuejax.units import factor, quantity
 
 # What a column may hold, and the SI unit that its own unit must convert to.
@@ -43,9 +45,11 @@ SPECIMEN = {
 PART = (
     "file", "where", "sample", "recording", "experiment", "positive", "columns", "specimen", "noise",
     "attributes", "every", "missing", "settling", "relative_to_first", "lowpass", "separator",
-    "decimal", "comment", "skip", "header",
+    "decimal", "comment", "skip", "header", "units_row", "format", "direction",
+    "cycles", "phase", "upto", "preload", "toe",
 )
 # fmt: on
+READING = ("separator", "decimal", "comment", "skip", "header", "units_row", "format")
 WHOLE = ("part", "source", "notes", "density")
 
 
@@ -91,6 +95,8 @@ class Part:
     settling: bool = False
     relative_to_first: bool = False
     lowpass: float | None = None
+    direction: tuple[float, float, float] | None = None
+    selection: Selection = Selection()
     reading: Mapping[str, object] = field(default_factory=dict)
 
 
@@ -158,9 +164,8 @@ def _part(table: Mapping[str, object]) -> Part:
         if key not in table:
             raise InputError(f"{key}: found nothing, expected {_EXAMPLES[key]}")
     get = functools.partial(_typed, table)
-    experiment = get("experiment", str, "")
-    layout(experiment)
-    specimen = dict(get("specimen", dict, {}))
+    experiment, sense = experiment_of(get("experiment", str, ""))
+    specimen = _in_our_words(get("specimen", dict, {}), SIZE_WORDS, SPECIMEN, "specimen")
     lookup = None
     if "file" in specimen or "key" in specimen:
         if not {"file", "key"} <= specimen.keys():
@@ -170,22 +175,75 @@ def _part(table: Mapping[str, object]) -> Part:
     return Part(
         file=get("file", str, ""),
         experiment=experiment,
-        columns=_columns(get("columns", dict, {})),
+        columns=_columns(_in_our_words(get("columns", dict, {}), COLUMN_WORDS, QUANTITIES, "columns")),
         sample=get("sample", str, "sample"),
         recording=get("recording", str, "r1"),
         where=get("where", dict, {}),
-        positive=_choice(table, "positive", ("tension", "compression")),
+        positive=_choice({"positive": sense or "tension"} | table, "positive", ("tension", "compression")),
         specimen={k: _size(k, v) for k, v in specimen.items()},
         lookup=lookup,
-        noise={k: _noise(k, v) for k, v in get("noise", dict, {}).items()},
+        noise={
+            k: _noise(k, v) for k, v in _in_our_words(get("noise", dict, {}), COLUMN_WORDS, QUANTITIES, "noise").items()
+        },
         attributes=_numbers(get("attributes", dict, {})),
         every=max(1, get("every", int, 1)),
         missing=_choice(table, "missing", ("refuse", "drop")),
         settling=get("settling", bool, False),
         relative_to_first=get("relative_to_first", bool, False),
         lowpass=None if lowpass is None else quantity(lowpass, "Hz", "lowpass"),
-        reading={k: table[k] for k in ("separator", "decimal", "comment", "skip", "header") if k in table},
+        direction=_direction(table.get("direction")),
+        selection=selection_from(table),
+        reading={k: table[k] for k in READING if k in table},
     )
+
+
+def experiment_of(word: str) -> tuple[str, str]:
+    """The kind of experiment that a word names, and the sense that counts positive where the word says so.
+
+    Raises:
+        InputError: an unknown word; the nearest kinds and words are offered.
+    """
+    if word in LAYOUTS:
+        return word, ""
+    plain = word.strip().lower().replace("_", "-")
+    if plain in LAYOUTS:
+        return plain, ""
+    if plain in EXPERIMENT_WORDS:
+        kind, sense = EXPERIMENT_WORDS[plain]
+        # A probing counts its depth positive whatever is said.
+        return kind, "" if kind == "probing" else sense
+    raise unknown("experiment kind", word, [*LAYOUTS, *EXPERIMENT_WORDS])
+
+
+def _in_our_words(
+    table: Mapping[str, object], words: Mapping[str, str], ours: Mapping[str, str], place: str
+) -> dict[str, object]:
+    """A table with natural words for its keys turned into the project's own ("load" into "force").
+
+    Raises:
+        InputError: a key and its other name at once.
+    """
+    found: dict[str, object] = {}
+    for key, value in table.items():
+        # "length" is a quantity of [columns] in its own right and another word for the height in [specimen].
+        name = key if key in ours else words.get(key.lower(), key)
+        if name in found:
+            raise InputError(f"{place}.{key}: given twice, {key!r} being another word for {name!r}: keep one")
+        found[name] = value
+    return found
+
+
+def _direction(value: object) -> tuple[float, float, float] | None:
+    """A direction in the sample's own frame, of length one."""
+    if value is None:
+        return None
+    numbers = isinstance(value, list) and all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
+    length = sum(v * v for v in value) ** 0.5 if numbers else 0.0
+    if not numbers or len(value) != 3 or not 0 < length < float("inf"):
+        raise InputError(
+            f"direction: found {value!r}, expected three numbers, such as [1, 0, 0]: where the load points"
+        )
+    return tuple(v / length for v in value)
 
 
 _EXAMPLES = {
@@ -243,6 +301,8 @@ def _column(place: str, spec: object, si: str) -> Column:
 def _size(name: str, value: object) -> float | Column:
     if name not in SPECIMEN:
         raise InputError(str(unknown("size in [specimen]", name, [*SPECIMEN, "file", "key"])))
+    if value == "?":
+        raise InputError(f'specimen.{name}: found "?", expected a size: measure it and write it here, e.g. "25 mm"')
     if isinstance(value, dict):
         return _column(f"specimen.{name}", value, SPECIMEN[name])
     size = quantity(value, SPECIMEN[name], f"specimen.{name}")

@@ -1,6 +1,7 @@
 """The rows of one test turned into a Recording: units, signs, zeroing, filter, then stretch and nominal stress."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from tissuejax.recordings import checks, rig
 from tissuejax.recordings import conversions as convert
 from tissuejax.recordings.delimited import Columns
 from tissuejax.recordings.recording import Channel, Recording
+from tissuejax.recordings.selection import chosen, start_of
 from tissuejax.recordings.side_file import KINEMATIC, QUANTITIES, SIGNED, STRESS, Column, Part
 from tissuejax.units import factor, quantity
 
@@ -47,12 +49,20 @@ def recording_from(
     if part.lowpass is not None:
         values = {q: rig.lowpass(time, v, part.lowpass) for q, v in values.items()}
         notes.append(f"Butterworth low-pass at {part.lowpass:g} Hz.")
-    keep = slice(None, None, part.every)
-    time, values = time[keep], {q: v[keep] for q, v in values.items()}
     kinematic = next(q for q in values if q in KINEMATIC)
     load = next(q for q in values if q in STRESS)
+    if part.selection:
+        kept = selected(part, values, kinematic, load, sizes, place)
+        time, values, rows, sizes = time[kept.rows], kept.values, rows[kept.rows], kept.sizes
+        notes += kept.notes
+        if timed and part.columns["time"][0].zero:
+            time = time - time[0]
+    keep = slice(None, None, part.every)
+    time, values = time[keep], {q: v[keep] for q, v in values.items()}
     given = {k: sizes[k] for k in ("height", "diameter") if k in sizes}
     attributes = dict(part.attributes) | given
+    if part.direction is not None:
+        attributes["direction"] = np.array(part.direction)
     if part.experiment in ("probing", "cutting"):
         return _probing(part, time, values, kinematic, load, sizes, name, place, attributes), notes
     motion = _motion(part, values[kinematic], kinematic, sizes, place)
@@ -68,6 +78,57 @@ def recording_from(
         attributes[f"{key}/noise_std"] = _said(told, kinematic, columns, rows) * slope
     channel = Channel(time, stress, "Pa", noise)
     return Recording(name, part.experiment, {"time": time, key: motion}, {"nominal_stress": channel}, attributes), notes
+
+
+class Kept(NamedTuple):
+    """What a selection leaves of one test.
+
+    Attributes:
+        rows: places among the test's rows.
+        values: the columns of these rows, deformation counted from its new zero.
+        sizes: specimen sizes; the height is the new one where lengths were measured.
+        notes: what was done.
+    """
+
+    rows: np.ndarray
+    values: dict[str, np.ndarray]
+    sizes: Sizes
+    notes: list[str]
+
+
+def selected(part: Part, values: Mapping[str, np.ndarray], kinematic: str, load: str, sizes: Sizes, place: str) -> Kept:
+    """The rows that the side file's selection keeps, see `selection`; deformation counts from preload or toe.
+
+    Raises:
+        InputError: nothing left, a cycle that isn't there, a preload that is never reached.
+    """
+    told = part.selection
+    mask, notes = chosen(told, values[kinematic], values[load], place)
+    rows = np.flatnonzero(mask)
+    if not told.preload and told.toe is None:
+        return Kept(rows, {q: v[rows] for q, v in values.items()}, sizes, notes)
+    if values[kinematic].ndim != 1:
+        raise checks.refusal(place, "preload, toe", "a biaxial test", "a test with one load: cut the rows by `where`")
+    si = QUANTITIES[load]
+    preload = quantity(told.preload, si, "preload") if told.preload else None
+    toe = tuple(quantity(t, si, "toe") for t in told.toe) if told.toe else None
+    first, zero, said = start_of(told, values[kinematic][rows], values[load][rows], preload, toe, place)
+    rows = rows[first:]
+    if len(rows) < 2:
+        raise checks.refusal(place, "preload, toe", f"{len(rows)} row(s) left", "at least 2")
+    left = {q: v[rows] for q, v in values.items()}
+    if kinematic == "length":
+        sizes = {**sizes, "height": zero}
+    else:
+        left[kinematic] = _from_zero(left[kinematic], kinematic, zero)
+    return Kept(rows, left, sizes, notes + said)
+
+
+def _from_zero(values: np.ndarray, kind: str, zero: float) -> np.ndarray:
+    """A measure of deformation referred to the state in which it read `zero`."""
+    if kind in ("stretch", "radial_stretch"):
+        return values / zero
+    return (1 + values) / (1 + zero) - 1 if kind == "strain" else values - zero
 
 
 def _numbers(part: Part, columns: Columns, rows: np.ndarray, place: str) -> tuple[dict[str, np.ndarray], np.ndarray]:

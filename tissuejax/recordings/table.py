@@ -40,6 +40,7 @@ import numpy as np
 from tissuejax.errors import InputError, unknown
 from tissuejax.recordings import checks
 from tissuejax.recordings.delimited import Columns, load
+from tissuejax.recordings.exports.export import export_named
 from tissuejax.recordings.format import Format
 from tissuejax.recordings.places import resolve
 from tissuejax.recordings.recording import Sample
@@ -96,10 +97,9 @@ def _side(path: Path) -> SideFile:
     beside = path.with_name(re.sub(r"\.[a-z]+(\.gz)?$", "", path.name, flags=re.I) + ".toml")
     if beside.is_file():
         return _parsed(beside, beside.stat().st_mtime_ns)
-    known = ", ".join(load(path).cells)
     raise InputError(
-        f"{path}: found a table without a side file, expected {beside.name} beside it, saying what its columns "
-        f"({known}) hold: see the example at the top of tissuejax/recordings/table.py"
+        f"{path}: found a table without a side file, expected {beside.name} beside it, saying what its columns hold: "
+        f"`tissuejax import {path}` looks at the table and writes one"
     )
 
 
@@ -110,7 +110,15 @@ def _parsed(path: Path, changed: int) -> SideFile:
 
 @functools.lru_cache(maxsize=8)
 def _loaded(path: Path, changed: int, reading: tuple) -> Columns:
-    return load(path, **dict(reading))
+    told = dict(reading)
+    kind = told.pop("format", None)
+    if kind is None:
+        return load(path, **told)
+    if told:
+        raise InputError(
+            f"{path}: format = {kind!r} says how the file is laid out: leave {', '.join(told)} out, or leave format out"
+        )
+    return export_named(kind).read(path).columns
 
 
 def _columns_of(part: Part, file: str, side: SideFile) -> Columns:
@@ -154,7 +162,7 @@ def _labels(template: str, columns: Columns) -> np.ndarray:
     pieces = re.split(r"\{([^{}]*)\}", template)
     made = np.full(len(columns.lines), pieces[0], dtype=object)
     for column, text in zip(pieces[1::2], pieces[2::2]):
-        made = made + columns.text(column) + text
+        made = made + columns.text(column).astype(str) + text
     return made
 
 

@@ -1,0 +1,140 @@
+"""`tissuejax import` on tables as labs have them: what is guessed is what the table holds, and the side file runs."""
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+
+from tissuejax.cli import main
+from tissuejax.recordings.files import read
+from tissuejax.recordings.guessing import guessed
+
+T = np.linspace(0, 10, 41)
+U = 0.5 * T  # mm, of 25 mm
+F = 0.2 * U + 0.05 * U**2  # N, on 12 mm^2
+
+
+def table(columns, rows, mark=",", decimal=".", above="", below="", encoding="utf-8", end="\n"):
+    """Bytes of a table."""
+    body = [mark.join(f"{v:.6g}".replace(".", decimal) for v in row) for row in rows]
+    text = "\n".join([*([above] if above else []), *columns, *body, *([below] if below else [])]) + "\n"
+    return text.replace("\n", end).encode(encoding)
+
+
+ROWS = np.stack([T, U, F], axis=1)
+LAYOUTS = {
+    "plain": table(["Time (s),Displacement (mm),Force (N)"], ROWS),
+    "semicolon, comma": table(["Zeit [s];Weg [mm];Kraft [N]"], ROWS, ";", ","),
+    "units row": table(["Time,Extension,Load", "(sec),(mm),(N)"], ROWS, end="\r\n"),
+    "tab, units row bare": table(["Test time\tCrosshead\tStandard force", "s\tmm\tN"], ROWS, "\t"),
+    "latin-1": table(
+        ["Prüfzeit;Standardweg;Standardkraft", "s;mm;N"], ROWS, ";", ",", "Prüfer;Müller", encoding="latin-1"
+    ),
+    "utf-16": table(["time_s,displacement_mm,force_N"], ROWS, encoding="utf-16"),
+    "kN, um": table(["t in s;Weg in um;F in kN"], ROWS * [1, 1e3, 1e-3], ";", ","),
+    "no names": table([], ROWS),
+    "text after": table(["Time (s),Displacement (mm),Force (N)"], ROWS, below="\nEnd of test\n"),
+}
+
+
+@pytest.mark.parametrize("layout", [k for k in LAYOUTS if k != "no names"])
+def test_one_command_makes_a_side_file_that_reads_right(layout, tmp_path, capsys):
+    path = tmp_path / "my.csv"
+    path.write_bytes(LAYOUTS[layout])
+    code = main(["import", str(path), "--height", "25mm", "--area", "12 mm^2", "--json"])
+    said = json.loads(capsys.readouterr().out)
+    assert code == 0, said
+    r = read(tmp_path / "my.toml").recordings["r1"]
+    np.testing.assert_allclose(r.inputs["time"], T, atol=1e-4)
+    np.testing.assert_allclose(r.inputs["stretch"], 1 + U / 25, rtol=1e-5)
+    np.testing.assert_allclose(r.channels["nominal_stress"].values, F / 12e-6, rtol=1e-5)
+    assert any("tension" in s for s in said["assumed"])
+
+
+def test_columns_without_names_are_refused_with_what_to_do(tmp_path, capsys):
+    (tmp_path / "my.csv").write_bytes(LAYOUTS["no names"])
+    assert main(["import", str(tmp_path / "my.csv")]) == 2
+    assert "--template" in capsys.readouterr().err
+
+
+def test_sizes_in_the_key_lines_are_taken(tmp_path):
+    above = "Specimen label;liver 3\nProbenlänge;25,0;mm\nBreite;6 mm\nDicke (mm);2,0\n"
+    (tmp_path / "my.csv").write_bytes(
+        table(["Zeit;Weg;Kraft", "(s);(mm);(N)"], ROWS, ";", ",", above, encoding="cp1252")
+    )
+    guess = guessed(tmp_path / "my.csv")
+    assert guess.specimen == {"height": "25.0 mm", "width": "6 mm", "thickness": "2.0 mm"}
+    assert guess.sample == "liver 3"
+
+
+def test_what_is_lacking_is_said_and_a_side_file_written(tmp_path, capsys):
+    (tmp_path / "my.csv").write_bytes(LAYOUTS["plain"])
+    assert main(["import", str(tmp_path / "my.csv")]) == 2
+    assert "height, area" in capsys.readouterr().out
+    assert main(["inspect", str(tmp_path / "my.toml")]) == 2
+    assert "measure it" in capsys.readouterr().err
+
+
+SENSES = {
+    # name of the file, sign of displacement and force in the table -> stretch at the end
+    "pull": ("pull.csv", 1, 1, 1.2),
+    "compression": ("compression-1.csv", 1, 1, 0.8),
+    "both fall": ("a.csv", -1, -1, 0.8),
+    "opposite": ("b.csv", 1, -1, 0.8),
+}
+
+
+@pytest.mark.parametrize("sense", SENSES)
+def test_the_sense_of_the_load(sense, tmp_path):
+    name, u, f, end = SENSES[sense]
+    (tmp_path / name).write_bytes(table(["Time (s),Displacement (mm),Force (N)"], ROWS * [1, u, f]))
+    assert main(["import", str(tmp_path / name), "--height", "25mm", "--area", "12 mm^2"]) == 0
+    r = next(iter(read((tmp_path / name).with_suffix(".toml")).recordings.values()))
+    assert r.inputs["stretch"][-1] == pytest.approx(end)
+    assert np.sign(r.channels["nominal_stress"].values[-1]) == np.sign(end - 1)
+
+
+def test_a_time_that_runs_backwards_is_left_out_and_said(tmp_path, capsys):
+    rows = ROWS.copy()
+    rows[20:, 0] -= 3
+    (tmp_path / "my.csv").write_bytes(table(["Time (s),Strain,Stress (kPa)"], rows * [1, 0.1, 1]))
+    assert main(["import", str(tmp_path / "my.csv")]) == 0
+    out = capsys.readouterr().out
+    assert "backwards at line 22" in out
+    assert "No time was recorded" in read(tmp_path / "my.toml").notes
+
+
+def test_specimens_side_by_side_become_recordings(tmp_path):
+    rows = np.stack([U, F, 2 * F, 3 * F], axis=1)
+    (tmp_path / "my.csv").write_bytes(table(["disp_mm,A1_force_N,A2_force_N,B_force_N"], rows))
+    assert main(["import", str(tmp_path / "my.csv"), "--height", "25mm", "--area", "12mm2"]) == 0
+    found = read(tmp_path / "my.toml").recordings
+    assert list(found) == ["a1", "a2", "b"]
+    np.testing.assert_allclose(found["b"].channels["nominal_stress"].values, 3 * F / 12e-6, rtol=1e-5)
+
+
+def test_nothing_is_overwritten_unasked(tmp_path, capsys):
+    (tmp_path / "my.csv").write_bytes(LAYOUTS["plain"])
+    argv = ["import", str(tmp_path / "my.csv"), str(tmp_path / "x.h5"), "--height", "25mm", "--area", "12mm^2"]
+    assert main(argv) == 0
+    assert main(argv) == 2
+    assert "--force" in capsys.readouterr().err
+    assert main([*argv, "--force"]) == 0
+    assert read(tmp_path / "x.h5").recordings["r1"].inputs["stretch"][-1] == pytest.approx(1.2)
+
+
+@pytest.mark.parametrize(
+    "kind", ["tension", "compression", "planar", "equibiaxial", "biaxial", "simple-shear", "probing"]
+)
+def test_each_template_is_a_side_file_that_reads(kind, tmp_path, capsys):
+    assert main(["import", "--template", kind]) == 0
+    text = capsys.readouterr().out
+    told = tomllib.loads(text)
+    columns = [c for spec in told["columns"].values() for c in (spec if isinstance(spec, list) else [spec])]
+    names = [c["column"] for c in columns]
+    rows = [[k * 0.5 if "time" in n else 1 + 0.01 * k if "stretch" in n else 0.1 * k for n in names] for k in range(30)]
+    (tmp_path / "my.csv").write_bytes(table([",".join(names)], rows))
+    (tmp_path / "my.toml").write_text(text)
+    (recording,) = read(tmp_path / "my.toml").recordings.values()
+    assert recording.experiment == ("uniaxial" if kind in ("tension", "compression") else kind)

@@ -1,0 +1,154 @@
+"""What the columns of an unknown table hold: quantity, unit and label of each, and the ones that make a recording."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tissuejax.errors import InputError
+from tissuejax.recordings.exports.meanings import IN_SHEAR, bare, quantity_of, split_unit
+from tissuejax.recordings.side_file import KINEMATIC, QUANTITIES, STRESS
+from tissuejax.units import factor
+
+# Where no unit stands: what machines write most.
+USUAL = {"time": "s", "displacement": "mm", "length": "mm", "force": "N", "nominal_stress": "MPa", "true_stress": "MPa"}
+USUAL |= {"angle": "deg"}
+# The better of several: engineering before true, stress and strain as given before force over an area not known.
+PREFERRED = ("stretch", "strain", "length", "displacement", "true_strain", "shear", "angle", "radial_stretch")
+LOADS = ("nominal_stress", "force", "true_stress")
+
+
+@dataclass(frozen=True)
+class Guessed:
+    """One column understood.
+
+    Attributes:
+        column: its name in the file.
+        quantity: one of the side file's quantities, or "".
+        unit: as it stands, or assumed.
+        label: what stands before the quantity in the name ("VA1" in "VA1_force_kN"), or "".
+        assumed: a sentence on what was taken for granted, or "".
+    """
+
+    column: str
+    quantity: str
+    unit: str
+    label: str = ""
+    assumed: str = ""
+
+
+def understood(
+    units: Mapping[str, str], numbers: Mapping[str, np.ndarray], meanings: Mapping[str, str], shear: bool
+) -> list[Guessed]:
+    """Every column of a table, in order.
+
+    Args:
+        units: unit by column as it stands, "" for none.
+        numbers: the columns that hold numbers.
+        meanings: bare names that the format knows; "" says that a column is of no use.
+        shear: whether the test is known to be a shear test.
+    """
+    return [_one(name, unit, numbers[name], meanings, shear) for name, unit in units.items() if name in numbers]
+
+
+def _one(name: str, unit: str, values: np.ndarray, meanings: Mapping[str, str], shear: bool) -> Guessed:
+    base = split_unit(name)[0]
+    label = ""
+    text = re.sub(r" \d+$", "", bare(base)) if name.endswith(")") and not unit else bare(base)
+    told = meanings.get(text)
+    quantity = told if told is not None else quantity_of(base, unit)
+    if quantity is None:
+        words = text.split()
+        for k in range(1, len(words)):
+            quantity = quantity_of(" ".join(words[k:]), unit)
+            if quantity:
+                label = " ".join(words[:k])
+                break
+    if not quantity or quantity not in QUANTITIES:
+        return Guessed(name, "", unit)
+    quantity = IN_SHEAR.get(quantity.replace("nominal_", ""), quantity) if shear else quantity
+    if quantity == "displacement" and unit and _fits(unit, "rad") and not _fits(unit, "1"):
+        quantity = "angle"
+    if unit and not _fits(unit, QUANTITIES[quantity]):
+        return Guessed(name, "", unit)
+    assumed = ""
+    if not unit:
+        unit, assumed = _usual(name, quantity, values)
+    return Guessed(name, quantity, unit, label, assumed)
+
+
+def _fits(unit: str, si: str) -> bool:
+    try:
+        factor(unit, si)
+    except InputError:
+        return False
+    return True
+
+
+def _usual(name: str, quantity: str, values: np.ndarray) -> tuple[str, str]:
+    if quantity not in USUAL:
+        if quantity in ("strain", "true_strain", "shear") and np.nanmax(np.abs(values), initial=0.0) > 5:
+            return "%", f"{name!r} reaches {np.nanmax(np.abs(values)):.3g} and has no unit: taken as percent"
+        return "1", ""
+    return USUAL[quantity], f"{name!r} has no unit: taken as {USUAL[quantity]}"
+
+
+def chosen_time(found: Sequence[Guessed], numbers: Mapping[str, np.ndarray], blocks: np.ndarray) -> Guessed | None:
+    """The first time column that runs forwards within each block; else the first one at all; None without one."""
+    times = [g for g in found if g.quantity == "time"]
+    return next((g for g in times if backwards(numbers[g.column], blocks) is None), times[0] if times else None)
+
+
+def backwards(values: np.ndarray, blocks: np.ndarray) -> int | None:
+    """The first row at which a time doesn't increase within its block, or None."""
+    seen = np.flatnonzero(np.isfinite(values))
+    bad = np.flatnonzero((np.diff(values[seen]) <= 0) & (blocks[seen][1:] == blocks[seen][:-1]))
+    return int(seen[bad[0] + 1]) if len(bad) else None
+
+
+def chosen_pairs(found: Sequence[Guessed], experiment: str, sizes: Sequence[str]) -> list[tuple[list[Guessed], str]]:
+    """The deformation and load columns of each recording in the table, with the recording's label.
+
+    One pair for a plain table; one for each label where columns differ by what stands before the quantity. A biaxial
+    test has two deformations and two loads (columns named X and Y, or 1 and 2).
+
+    Raises:
+        InputError: no column of deformation or of load; which columns there are.
+    """
+    motions = [g for g in found if g.quantity in KINEMATIC]
+    loads = [g for g in found if g.quantity in STRESS]
+    if not motions or not loads:
+        missing = "deformation (stretch, strain, displacement, length ...)" if not motions else "load (force, stress)"
+        there = ", ".join(repr(g.column) for g in found)
+        raise InputError(
+            f"found no column of {missing} among {there}: write the side file by hand from "
+            "`tissuejax import --template uniaxial`, or name the columns plainly (time, displacement, force, ...)"
+        )
+    if experiment == "biaxial":
+        return [(_axes(motions) + _axes(loads), "")]
+    plain = [g for g in loads if not g.label]
+    labels = list(dict.fromkeys(g.label for g in loads)) if not plain else [""]
+    pairs = []
+    for label in labels:
+        own = [g for g in loads if g.label == label]
+        with_it = [g for g in motions if g.label == label] or [g for g in motions if not g.label] or motions
+        load = min(own, key=lambda g: LOADS.index(g.quantity))
+        motion = min(with_it, key=lambda g: PREFERRED.index(g.quantity))
+        # A crosshead reading over a known height goes with a force; strain and stress go together.
+        moved = [g for g in with_it if g.quantity == "displacement"]
+        if load.quantity == "force" and moved and (experiment == "probing" or "height" in sizes):
+            motion = moved[0]
+        pairs.append(([motion, load], label))
+    return pairs
+
+
+def _axes(columns: Sequence[Guessed]) -> list[Guessed]:
+    """The two columns of the best quantity of which there are two."""
+    order = (*PREFERRED, *LOADS)
+    for quantity in sorted({g.quantity for g in columns}, key=order.index):
+        two = [g for g in columns if g.quantity == quantity]
+        if len(two) >= 2:
+            return two[:2]
+    names = ", ".join(repr(g.column) for g in columns)
+    raise InputError(f"a biaxial test needs two columns of one quantity, found {names}; name another --experiment")

@@ -1,0 +1,331 @@
+"""What a file of unknown layout holds, guessed: format, columns, units, signs, specimen sizes; each guess is said."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from tissuejax.errors import InputError
+from tissuejax.recordings.columns_guessed import Guessed, backwards, chosen_pairs, chosen_time, understood
+from tissuejax.recordings.delimited import Columns, text_lines
+from tissuejax.recordings.exports import text
+from tissuejax.recordings.exports.export import BLOCK, Exported, TableExport, recognised, stacked
+from tissuejax.recordings.exports.meanings import bare, readable, size_of, split_unit
+from tissuejax.recordings.side_file import KINEMATIC, SPECIMEN
+from tissuejax.units import quantity
+
+_NAME_KEYS = (
+    "specimen label",
+    "sample name",
+    "specimen name",
+    "specimen id",
+    "sample id",
+    "sample",
+    "specimen",
+    "probe",
+)
+_PRESSED = re.compile(r"compress|druck|stauch", re.I)
+_SHEARED = re.compile(r"shear|scher", re.I)
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Everything that a side file says, and the sentences on what was taken for granted.
+
+    Attributes:
+        path: the table.
+        format: name of the raw export, "" for a plain table.
+        reading: separator, decimal, skip, header, units_row of a plain table.
+        experiment, positive: as in a side file.
+        sample, recording: names or templates.
+        pairs: columns (deformation and load) of each recording, with its label.
+        time: the time column, None without one.
+        time_fault: why the time column can't be used, "" where it can.
+        signs: -1 or 1 by column.
+        zeros: columns counted from their first sample.
+        specimen: sizes with units, "?" where one is needed and not known.
+        missing: whether rows with empty cells are left out.
+        unused: columns that aren't used.
+        said: sentences on what was assumed.
+        machine: what wrote the file, "" where not known.
+        where: rows kept, by column.
+    """
+
+    path: Path
+    format: str
+    reading: Mapping[str, object]
+    experiment: str
+    positive: str
+    sample: str
+    recording: str
+    pairs: list[tuple[list[Guessed], str]]
+    time: Guessed | None
+    time_fault: str
+    signs: Mapping[str, int]
+    zeros: tuple[str, ...]
+    specimen: Mapping[str, str]
+    missing: bool
+    unused: tuple[str, ...]
+    said: tuple[str, ...]
+    machine: str = ""
+    where: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def lacking(self) -> tuple[str, ...]:
+        """Sizes that the side file needs and nobody has told."""
+        return tuple(k for k, v in self.specimen.items() if v == "?")
+
+
+def guessed(
+    path: Path, experiment: str = "", positive: str = "", sizes: Mapping[str, str] | None = None, format: str = ""
+) -> Guess:
+    """Look at a table and say what it holds.
+
+    Args:
+        path: the file.
+        experiment, positive: where the user says them.
+        sizes: specimen sizes that the user gives, texts with units.
+        format: name of a raw export, where the user knows it.
+
+    Raises:
+        InputError: no table of numbers, no column of deformation or load, a kind of test that no experiment predicts.
+    """
+    kind, exported, reading, said = _content(path, format)
+    columns, said = exported.columns, [*said, *exported.assumed]
+    words = " ".join([path.stem, *exported.units, *exported.header, *map(str, exported.header.values())])
+    experiment, why = (experiment, "") if experiment else _experiment(kind, exported, words)
+    said += [why] if why else []
+    numbers = {n: v for n in exported.units if (v := _numbers(columns, n)) is not None}
+    meanings = kind.meanings if kind else {}
+    found = understood(exported.units, numbers, meanings, experiment == "simple-shear")
+    _refuse_torsion(found, exported, path)
+    known = _header_sizes(exported.header) | dict(sizes or {})
+    for name, value in known.items():
+        if quantity(value, SPECIMEN[name], name) <= 0:
+            raise InputError(f"{name} = {value!r}: expected a size above zero")
+    try:
+        pairs = chosen_pairs(found, experiment, tuple(known))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    blocks = columns.cells[BLOCK].astype(str) if BLOCK in columns.cells else np.full(len(columns.lines), "")
+    time = chosen_time(found, numbers, blocks)
+    fault = ""
+    if time is not None and (row := backwards(numbers[time.column], blocks)) is not None:
+        before = columns.text(time.column)[max(0, row - 1)]
+        fault = (
+            f"runs backwards at line {columns.lines[row]} ({columns.text(time.column)[row]} after {before}), so it is "
+            "left out and samples are taken as 1 s apart: mend the column and take the line in again"
+        )
+        said.append(f"the time column {time.column!r} {fault}")
+    used = [g for pair, _ in pairs for g in pair] + ([time] if time and not fault else [])
+    said += list(dict.fromkeys(g.assumed for g in used if g.assumed))
+    signs, positive, told = _signs(pairs, numbers, experiment, positive, bool(_PRESSED.search(words)))
+    said += told
+    zeros = _zeros(pairs, numbers, experiment, said)
+    specimen = _needed(pairs, experiment, known)
+    empty = ~np.all([np.isfinite(numbers[g.column]) for g in used], axis=0)
+    if len(pairs) == 1 and empty.any():
+        said.append(f"{int(empty.sum())} rows have empty cells in these columns and are left out")
+    if len(pairs) > 1:
+        said.append(f"{len(pairs)} recordings side by side: {', '.join(label for _, label in pairs)}")
+    return Guess(
+        path=path,
+        format=kind.name if kind else "",
+        reading=reading,
+        experiment=experiment,
+        positive=positive,
+        sample=_sample(exported.header, path),
+        recording=f"{{{BLOCK}}}" if BLOCK in columns.cells else "r1",
+        pairs=pairs,
+        time=time,
+        time_fault=fault,
+        signs=signs,
+        zeros=zeros,
+        specimen=specimen,
+        missing=bool(empty.any()),
+        unused=tuple(n for n in exported.units if n not in {g.column for g in used} and n != BLOCK),
+        said=tuple(said),
+        machine=kind.machine if kind and kind.name != "text" else "",
+    )
+
+
+def _content(path: Path, format: str) -> tuple[TableExport | None, Exported, dict[str, object], list[str]]:
+    """The reader (None for a plain table), the content, how a plain table is read, and what was assumed."""
+    from tissuejax.recordings.exports.export import export_named
+
+    kind = export_named(format) if format else recognised(path)
+    if kind is not None:
+        basis = f" (the reader was written from {kind.basis})" if "description" in kind.basis else ""
+        return kind, kind.read(path), {}, [f"it is an export of {kind.machine}{basis}"] if kind.name != "text" else []
+    lines = text_lines(path)
+    whole = text.understood(lines)
+    if not whole.tables:
+        raise InputError(f"{path}: found no table of numbers, expected rows of numbers under a line of column names")
+    table = whole.tables[0]
+    after = table.first + len(table.rows)
+    if len(whole.tables) > 1 or any(line.strip() for line in lines[after:]):
+        kind = export_named("text")
+        exported = kind.read(path)
+        blocks = f"{len(exported.blocks)} tables" if len(exported.blocks) > 1 else "text after the table"
+        return kind, exported, {}, [f'{blocks} found: read as format = "text"']
+    top = table.names_at if table.names_at is not None else table.first
+    exported = stacked(path, [table], text.header(lines[:top], whole.separator), decimal=whole.decimal)
+    reading: dict[str, object] = {"separator": text.NAMES[whole.separator]}
+    if whole.decimal != ".":
+        reading["decimal"] = whole.decimal
+    if top:
+        reading["skip"] = top
+    if table.names_at is None:
+        reading["header"] = False
+        cells = {str(k + 1): v for k, v in enumerate(exported.columns.cells.values())}
+        columns = Columns(path, cells, exported.columns.lines, whole.decimal)
+        exported = Exported(columns, dict.fromkeys(cells, ""), exported.header, exported.blocks)
+    if table.units_row:
+        reading["units_row"] = True
+    if any(name.startswith("#") for name in table.names[:1]):
+        reading["comment"] = ""
+    said = [f"cells are separated by {reading['separator']}, the decimal sign is {whole.decimal!r}"]
+    return None, exported, reading, said
+
+
+def _numbers(columns: Columns, name: str) -> np.ndarray | None:
+    """A column as numbers; None where fewer than half of its filled cells are numbers."""
+    try:
+        return columns.numbers(name)
+    except InputError:
+        return None
+
+
+def _experiment(kind: TableExport | None, exported: Exported, words: str) -> tuple[str, str]:
+    if kind is not None and kind.experiment:
+        return kind.experiment, ""
+    names = [bare(split_unit(n)[0]) for n in exported.units]
+    if any(_SHEARED.search(n) for n in names):
+        return "simple-shear", "a column speaks of shear: taken as simple shear (--experiment says otherwise)"
+    if any("indentation" in n or "penetration" in n for n in names) or any(
+        size_of(k) == "radius" for k in exported.header
+    ):
+        return "probing", "the file speaks of an indentation: taken as a probing by a ball"
+    return "uniaxial", "the kind of test isn't said: taken as uniaxial (--experiment says otherwise)"
+
+
+def _refuse_torsion(found: list[Guessed], exported: Exported, path: Path) -> None:
+    names = [bare(split_unit(n)[0]) for n in exported.units]
+    if "torque" in names and not any(g.quantity in ("force", "nominal_stress", "true_stress") for g in found):
+        raise InputError(
+            f"{path}: holds torque over rotation; no experiment here takes the torsion of a bar. If the machine can "
+            "export shear stress and shear strain (a rheometer can), export those and import them as simple-shear"
+        )
+
+
+def _header_sizes(header: Mapping[str, str]) -> dict[str, str]:
+    """Specimen sizes among a file's key lines, as texts with units."""
+    sizes: dict[str, str] = {}
+    for key, value in header.items():
+        size = size_of(key)
+        if size is None or size in sizes:
+            continue
+        found = re.match(r"\s*([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)\s*([^\s;]*)", value)
+        if not found:
+            continue
+        unit = found[2].strip("()[]") or split_unit(key)[1]
+        text_value = f"{found[1].replace(',', '.')} {unit}"
+        if unit and readable(unit) and _is_size(text_value, size):
+            sizes[size] = text_value.replace("µ", "u")
+    return sizes
+
+
+def _is_size(value: str, size: str) -> bool:
+    try:
+        return quantity(value, SPECIMEN[size]) > 0
+    except InputError:
+        return False
+
+
+def _signs(
+    pairs: list[tuple[list[Guessed], str]],
+    numbers: Mapping[str, np.ndarray],
+    experiment: str,
+    positive: str,
+    pressed: bool,
+) -> tuple[dict[str, int], str, list[str]]:
+    """Sign of each column, which sense counts positive, and what was assumed."""
+    pair = pairs[0][0]
+    motion, load = pair[0], pair[len(pair) // 2]
+    x, y = numbers[motion.column], numbers[load.column]
+    both = np.isfinite(x) & np.isfinite(y)
+    if not both.any():
+        return {}, positive or "tension", []
+    x, y = x[both], y[both]
+    most = int(np.argmax(np.abs(y - y[0])))
+    dx, dy = float(np.sign(x[most] - x[0])), float(np.sign(y[most] - y[0]))
+    if experiment == "probing":
+        signs = {g.column: -1 for g, s in ((motion, dx), (load, dy)) if s < 0}
+        said = [f"{', '.join(map(repr, signs))} falls as the tip goes in: turned round"] if signs else []
+        return signs, "tension", said
+    if positive or experiment == "simple-shear" or motion.quantity in ("stretch", "length"):
+        return {}, positive or "tension", []
+    if dx * dy < 0:
+        return (
+            {motion.column: -1 if dy < 0 else 1, load.column: 1} if dy < 0 else {motion.column: -1},
+            "tension",
+            [f"load and deformation have opposite signs: {motion.column!r} is turned round, to go with the load"],
+        )
+    if dx > 0 and pressed:
+        return {}, "compression", ["the file speaks of compression and its numbers rise: compression counts positive"]
+    if dx > 0 and experiment == "uniaxial":
+        return (
+            {},
+            "tension",
+            ["load and deformation rise together: taken as tension (--positive compression if pressed)"],
+        )
+    return {}, "tension", ["load and deformation fall together: taken as compression, which counts negative"]
+
+
+def _zeros(
+    pairs: list[tuple[list[Guessed], str]], numbers: Mapping[str, np.ndarray], experiment: str, said: list[str]
+) -> tuple[str, ...]:
+    """Displacements that don't start at zero; what is done about them is added to `said`."""
+    found = []
+    for pair, _ in pairs:
+        for guess in pair:
+            values = numbers[guess.column][np.isfinite(numbers[guess.column])]
+            if guess.quantity not in ("displacement", "force") or not len(values) or not np.ptp(values):
+                continue
+            share = abs(values[0]) / np.ptp(values)
+            if guess.quantity == "displacement" and share > 0.01 and experiment != "probing":
+                found.append(guess.column)
+                said.append(f"{guess.column!r} starts at {values[0]:.4g} {guess.unit}: counted from there")
+            elif guess.quantity == "force" and share > 0.05 and experiment != "probing":
+                said.append(
+                    f"{guess.column!r} starts at {values[0]:.4g} {guess.unit}, not at zero: a preload, or an offset of "
+                    "the cell (then: zero = true in its line)"
+                )
+    return tuple(dict.fromkeys(found))
+
+
+def _needed(pairs: list[tuple[list[Guessed], str]], experiment: str, known: Mapping[str, str]) -> dict[str, str]:
+    """The sizes known, and "?" for those that the columns need."""
+    used = {g.quantity for pair, _ in pairs for g in pair}
+    needed = {}
+    if experiment == "probing":
+        needed["radius"] = known.get("radius", "?")
+        return {k: v for k, v in known.items() if k in ("height", "radius")} | needed
+    if "displacement" in used:
+        needed["height"] = known.get("height", "?")
+    if "force" in used:
+        has_area = "area" in known or "diameter" in known or {"width", "thickness"} <= known.keys()
+        needed |= {} if has_area else {"area": "?"}
+    kept = {k: v for k, v in known.items() if k in ("height", "diameter", "area", "width", "thickness")}
+    return kept | needed if used & set(KINEMATIC) else needed
+
+
+def _sample(header: Mapping[str, str], path: Path) -> str:
+    named = {bare(k.rpartition(" : ")[2]): v for k, v in header.items()}
+    for key in _NAME_KEYS:
+        name = re.sub(r"[^\w .+-]", "-", named.get(key, "")).strip(" .")
+        if 0 < len(name) <= 60 and not readable(name):
+            return name
+    return re.sub(r"[{}#/\\]", "-", path.name.partition(".")[0]) or "sample"
