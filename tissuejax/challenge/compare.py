@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from tissuejax.challenge import files, rivals
-from tissuejax.challenge.grade import VISIBLE, rate, spread, table
+from tissuejax.challenge.grade import VISIBLE, table
+from tissuejax.challenge.rates import rate, spread
 from tissuejax.challenge.verdicts import mark
 from tissuejax.errors import InputError
 from tissuejax.progress import Progress, Silent

@@ -5,19 +5,19 @@ import io
 import json
 import math
 import os
-from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from tissuejax.challenge import files
-from tissuejax.challenge.verdicts import Mark, mark
+from tissuejax.challenge.rates import STATED, rate, spread
+from tissuejax.challenge.rest_grade import grade_rest
+from tissuejax.challenge.verdicts import SETTLED, Mark, mark
 from tissuejax.errors import InputError
 from tissuejax.storage import write_json, write_text
 
 EDGES = (0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, math.inf)
-STATED = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0)  # bins of stated confidence
 VISIBLE = 3.0  # times the noise: from here on the aims apply
 
 
@@ -36,6 +36,13 @@ def grade(folder: str | os.PathLike, out: str | os.PathLike | None = None) -> di
     """
     folder = Path(folder)
     manifest = files.read_manifest(folder)
+    out = Path(out) if out else folder
+    made = {k: manifest.get(k) for k in ("kind", "seed", "commit", "keys_sha256")}
+    if manifest["kind"] == "rest":
+        found, lines = grade_rest(folder, manifest)
+        write_text(out / "graded.csv", table(lines))
+        write_json(out / "graded.json", found | made)
+        return found | made
     keys = files.read_keys(folder, manifest)
     marks = []
     for name, key in keys.items():
@@ -46,13 +53,8 @@ def grade(folder: str | os.PathLike, out: str | os.PathLike | None = None) -> di
             marks.append(mark(name, key, json.loads(path.read_text()), seconds))
     if not marks:
         raise InputError(f"{folder} holds no results; run it first with `tissuejax challenge run {folder}`")
-    found = summary(marks) | {
-        "kind": manifest["kind"],
-        "seed": manifest["seed"],
-        "keys_sha256": manifest["keys_sha256"],
-    }
+    found = summary(marks) | made
     found["cases"], found["answered"] = len(keys), len(marks)
-    out = Path(out) if out else folder
     write_text(out / "graded.csv", table([_row(m) for m in marks]))
     write_text(out / "confusion.csv", table(confusion_rows(found["confusion"])))
     write_text(out / "by_size.csv", table(found["by_size"]))
@@ -73,7 +75,11 @@ def summary(marks: list[Mark]) -> dict:
         "single above 3 noise: right and no other": rate(seen, lambda m: m.exact),
         "single above 3 noise: right, or among the alternatives": rate(seen, lambda m: m.open_right),
         "same, laws like the catalogue's": rate([m for m in seen if m.plain], lambda m: m.exact),
-        "same, other laws": rate([m for m in seen if not m.plain], lambda m: m.exact),
+        "same, laws meant to be other": rate([m for m in seen if not m.plain], lambda m: m.exact),
+        "same, of these exact members of the catalogue's forms": rate(
+            [m for m in seen if not m.plain and m.member], lambda m: m.exact
+        ),
+        "same, of these truly other laws": rate([m for m in seen if m.member is False], lambda m: m.exact),
         "all singles: right and no other": rate(one, lambda m: m.exact),
         "pair, both above 3 noise: both named": rate(pairs, lambda m: m.all_named),
         "pair, both above 3 noise: both and no other": rate(pairs, lambda m: m.exact),
@@ -97,31 +103,6 @@ def summary(marks: list[Mark]) -> dict:
     }
 
 
-def rate(marks: list[Mark], is_true: Callable[[Mark], bool]) -> dict:
-    """Share of cases with Wilson's 95 % interval (Wilson 1927)."""
-    n, k = len(marks), sum(is_true(m) for m in marks)
-    if n == 0:
-        return {"share": None, "low": None, "high": None, "of": 0}
-    z, p = 1.96, k / n
-    middle, half = p + z * z / (2 * n), z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
-    low, high = ((middle + side) / (1 + z * z / n) for side in (-half, half))
-    return {"share": p, "low": max(low, 0.0), "high": min(high, 1.0), "of": n}  # rounding leaves the ends of 0 and 1
-
-
-def spread(values: Iterable[float]) -> dict:
-    """Median, 90 % quantile, largest, number, and share at most 1.1."""
-    x = np.array(list(values), float)
-    if not len(x):
-        return {"of": 0}
-    return {
-        "median": float(np.median(x)),
-        "q90": float(np.quantile(x, 0.9)),
-        "largest": float(x.max()),
-        "at_most_1.1": float(np.mean(x <= 1.1)),
-        "of": len(x),
-    }
-
-
 def confusion(marks: list[Mark]) -> dict[str, dict[str, int]]:
     """Counts by truth (one effect, "nothing", or "outside the catalogue") and what was named first, or the verdict."""
     found: dict[str, dict[str, int]] = {}
@@ -129,7 +110,7 @@ def confusion(marks: list[Mark]) -> dict[str, dict[str, int]]:
         if m.category in ("two", "three"):
             continue
         truth = {"none": "nothing", "unknown": "outside the catalogue"}.get(m.category) or m.truth[0]
-        said = m.named[0] if m.verdict in ("found", "ambiguous") and m.named else m.verdict
+        said = m.named[0] if m.verdict in SETTLED and m.named else m.verdict
         row = found.setdefault(truth, {})
         row[said] = row.get(said, 0) + 1
     return found

@@ -1,18 +1,22 @@
 """Make a challenge: cases from a seed, their keys sealed, and the hash of the keys in the manifest before any run."""
 
+import hashlib
 import json
 import os
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
-from tissuejax.challenge import files, material_cases
+import numpy as np
+
+from tissuejax.challenge import files, material_cases, rest_cases
 from tissuejax.errors import InputError, unknown
 from tissuejax.progress import Progress, Silent
-from tissuejax.storage import write_json
+from tissuejax.storage import replacing, write_json
 
-KINDS = ("material", "probing")
+KINDS = ("material", "probing", "rest")
 
 
 def make(
@@ -24,6 +28,7 @@ def make(
     progress: Progress | None = None,
     strong: bool = False,
     pairs: bool = False,
+    commit: str | None = None,
 ) -> dict:
     """Make `count` cases and return the manifest.
 
@@ -32,13 +37,14 @@ def make(
 
     Args:
         out: folder of the challenge.
-        kind: "material" or "probing".
+        kind: "material", "probing", or "rest": material tests of known effects beside a rest that no catalogue has.
         count: number of cases.
         seed: the same seed gives the same cases; another one, others.
         jobs: processes.
         progress: told after every case.
         strong: probings with strong effects only, one or two of them: how often is right what can be seen?
         pairs: probings with two effects each, both of those that can be seen at all, at the upper end of their range.
+        commit: hash of the commit that will be measured; the seed is drawn from it, so that nobody chooses it.
 
     Raises:
         InputError: unknown kind, strong material tests or pairs of them alone, both of these at once, a count below
@@ -54,16 +60,23 @@ def make(
     if (strong or pairs) and kind != "probing":
         raise InputError("strong cases are made of probings only; leave --strong, --pairs out, or take --kind probing")
     which = {"strong": strong, "pairs": pairs}
-    plan = {"version": 1, "kind": kind, "count": count, "seed": seed} | which
+    told = {} if commit is None else {"commit": commit}
+    if commit is not None:
+        seed = seed_of(commit, kind, which)
+    plan = {"version": 1, "kind": kind, "count": count, "seed": seed} | which | told
     if (out / "manifest.json").exists():
         manifest = {"strong": False, "pairs": False} | files.read_manifest(out)
-        if {k: manifest[k] for k in plan} == plan:
+        if {k: manifest.get(k) for k in plan} == plan:
             return manifest
-        if {k: manifest[k] for k in plan if k != "count"} != {k: v for k, v in plan.items() if k != "count"}:
+        if {k: manifest.get(k) for k in plan if k != "count"} != {k: v for k, v in plan.items() if k != "count"}:
             raise InputError(f"{out} holds another challenge already; name an empty folder, or remove that one")
         if manifest["count"] > count:
             raise InputError(f"{out} holds {manifest['count']} cases of this seed already; ask for as many or more")
-    case = partial(_material, out, seed) if kind == "material" else partial(_probing, out, seed, which)
+    case = {
+        "material": partial(_material, out, seed),
+        "rest": partial(_rest, out, seed),
+        "probing": partial(_probing, out, seed, which),
+    }[kind]
     entries, keys = {}, {}
     with (progress or Silent()).stage(f"making {count} {kind} cases", total=count) as stage:
         for name, energy, key in _each(case, count, jobs):
@@ -76,6 +89,18 @@ def make(
     manifest = plan | {"keys_sha256": files.sha256(sealed), "cases": [entries[name] for name in sorted(entries)]}
     write_json(out / "manifest.json", manifest)
     return manifest
+
+
+def seed_of(commit: str, kind: str, which: dict[str, bool]) -> int:
+    """The seed that belongs to a commit and a kind of challenge: the first eight digits of a hash of both.
+
+    Raises:
+        InputError: not a whole commit hash.
+    """
+    if len(commit) != 40 or set(commit) - set("0123456789abcdef"):
+        raise InputError(f"commit {commit!r} is not a whole hash of 40 digits; take that of `git rev-parse HEAD`")
+    words = [commit, kind, *(name for name, on in which.items() if on)]
+    return int(hashlib.sha256(" ".join(words).encode()).hexdigest()[:8], 16)
 
 
 def _each(case, count: int, jobs: int):
@@ -91,6 +116,17 @@ def _material(out: Path, seed: int, index: int) -> tuple[str, str, dict]:
     name = f"m{index:03d}"
     case = material_cases.draw(name, seed, index)
     files.write_material(case, out / "cases" / f"{name}.h5")
+    return name, case.energy, case.key
+
+
+def _rest(out: Path, seed: int, index: int) -> tuple[str, str, dict]:
+    name = f"s{index:03d}"
+    case, kept, stress = rest_cases.draw(name, seed, index)
+    files.write_material(case, out / "cases" / f"{name}.h5")
+    silent = replace(case, trials=[kept], stress={kept.name: np.zeros_like(stress)}, noise=None)
+    files.write_material(silent, out / "kept" / f"{name}.h5")  # what is done in it; its stress is sealed
+    with replacing(out / "sealed" / "kept" / f"{name}.npy") as temporary, open(temporary, "wb") as file:
+        np.save(file, stress)
     return name, case.energy, case.key
 
 

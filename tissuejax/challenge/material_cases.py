@@ -29,7 +29,7 @@ class Case:
         energy: base model told to the diagnosis.
         trials: what was done.
         stress: recorded nominal stress with noise by recording, Pa.
-        noise: its standard deviation, Pa.
+        noise: what is stated of its standard deviation, Pa; None if nothing is.
         key: the truth, ready for JSON.
     """
 
@@ -37,7 +37,7 @@ class Case:
     energy: str
     trials: list[Trial]
     stress: dict[str, np.ndarray]
-    noise: float
+    noise: float | None
     key: dict
 
 
@@ -65,8 +65,12 @@ def body(rng: np.random.Generator) -> tuple[Body, str]:
     return Body({"10": c10}), energy
 
 
-def choices(rng: np.random.Generator, kind: str, turn: int) -> list[Choice]:
-    """Effects of a case; single ones take their turn so that all are met equally often."""
+def choices(rng: np.random.Generator, kind: str, turn: int, alike: bool = False) -> list[Choice]:
+    """Effects of a case; single ones take their turn so that all are met equally often.
+
+    Args:
+        alike: draw pairs that look alike as well; without, no rate of pairs says anything about them.
+    """
     if kind == "none":
         return []
     if kind == "unknown":
@@ -76,7 +80,7 @@ def choices(rng: np.random.Generator, kind: str, turn: int) -> list[Choice]:
     others = rng.permutation([n for n in NAMES if n != first])
     picked = [first]
     for name in others:
-        if len(picked) < count and not any({name, p} in ALIKE for p in picked):
+        if len(picked) < count and (alike or not any({name, p} in ALIKE for p in picked)):
             picked.append(str(name))
     found = []
     for name in picked:
@@ -150,6 +154,7 @@ def _draw(name: str, rng: np.random.Generator, kind: str, turn: int) -> Case:
         "category": kind,
         "effects": [c.name for c in picked],
         "plain": {c.name: c.plain for c in picked},
+        "member": {c.name: c.member for c in picked},
         "ingredients": [{"name": i.name, "law": i.law, "amount": i.amount, **i.shape} for i in added],
         "tolerated": tolerated,
         "size_over_noise": sizes,

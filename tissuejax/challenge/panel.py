@@ -13,11 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tissuejax.challenge.grade import STATED, rate, spread
-from tissuejax.challenge.verdicts import names_in
+from tissuejax.challenge.rates import STATED, rate, spread
+from tissuejax.challenge.verdicts import SETTLED, names_in
 from tissuejax.errors import InputError
 
-NAMING = ("found", "found-in-part", "ambiguous")  # verdicts that name something
 NO_PROCESS = ("energy-form", "specimen-scatter")  # names that claim no process in tissue or rig
 
 
@@ -76,7 +75,7 @@ class Answer:
         """The answer in a word: the cause if it was named, else the first name given, else the verdict."""
         if self.met:
             return self.truth
-        if self.verdict not in NAMING or not self.named:
+        if self.verdict not in SETTLED or not self.named:
             return self.verdict
         return (self.wrong or self.named)[0]
 
@@ -113,7 +112,7 @@ def answered(cause: Cause, result: Mapping, words: Mapping[str, str] | None = No
         return tuple(dict.fromkeys(words.get(n, n) for n in names_in(found)))
 
     verdict = str(result.get("verdict"))
-    named = own(result.get("effects")) if verdict in NAMING else ()
+    named = own(result.get("effects")) if verdict in SETTLED else ()
     allowed = cause.beside.union(*cause.expected, NO_PROCESS if cause.null else ())
     wrong = tuple(n for n in named if n not in allowed)
     groups = [bool(g & set(named)) for g in cause.expected]

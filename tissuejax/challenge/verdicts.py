@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+SETTLED = ("found", "found-in-part", "ambiguous")  # verdicts that name something
+
 
 @dataclass(frozen=True)
 class Mark:
@@ -17,6 +19,7 @@ class Mark:
         alternatives: names offered instead.
         size: of the weakest effect, rms over noise after a refit of the base; nan for none.
         plain: all laws like the catalogue's.
+        member: all laws exact members of its forms; None where the key does not say.
         correlated: serially correlated noise.
         first: the first named effect is in it.
         exact: all effects named and no other (effects said to be tolerated aside).
@@ -36,6 +39,7 @@ class Mark:
     alternatives: tuple[str, ...]
     size: float
     plain: bool
+    member: bool | None
     correlated: bool
     first: bool
     exact: bool
@@ -86,7 +90,7 @@ def mark(name: str, key: dict, result: dict, seconds: float = math.nan) -> Mark:
     verdict = str(result.get("verdict"))
     tolerated = set(key.get("tolerated", ()))
     counted = set(named) - (tolerated - set(truth))
-    settled = verdict in ("found", "ambiguous")
+    settled = verdict in SETTLED
     exact = settled and counted == set(truth) and bool(truth)
     ambiguous = verdict == "ambiguous" and bool(truth) and set(truth) <= counted | set(offered)
     if category == "none":
@@ -105,6 +109,7 @@ def mark(name: str, key: dict, result: dict, seconds: float = math.nan) -> Mark:
         alternatives=offered,
         size=min(sizes) if sizes else math.nan,
         plain=all(key.get("plain", {}).values()),
+        member=all(key["member"].values()) if "member" in key else None,
         correlated=key.get("noise", {}).get("correlation", 0.0) > 0,
         first=settled and bool(named) and named[0] in truth,
         exact=exact,

@@ -37,10 +37,13 @@ says what simpler ways of answering would have said on the same cases.
         parser.add_argument("action", choices=("make", "run", "grade", "rivals"), help="what to do")
         parser.add_argument("folder", type=Path, metavar="FOLDER", help="the challenge")
         parser.add_argument(
-            "--kind", choices=KINDS, default="material", help="make: material tests (default) or probing"
+            "--kind", choices=KINDS, default="material", help="make: material tests (default), probing, or rest"
         )
         parser.add_argument("--count", type=int, default=200, metavar="N", help="make: number of cases (default 200)")
         parser.add_argument("--seed", type=int, default=1, help="make: the same seed gives the same cases (default 1)")
+        parser.add_argument(
+            "--commit", metavar="HASH", help="make: draw the seed from this commit's hash, so that nobody chooses it"
+        )
         parser.add_argument(
             "--strong",
             action="store_true",
@@ -57,7 +60,7 @@ says what simpler ways of answering would have said on the same cases.
     def run(self, given: argparse.Namespace) -> Reply:
         """Do one of the four."""
         if given.action == "make":
-            which = {"strong": given.strong, "pairs": given.pairs}
+            which = {"strong": given.strong, "pairs": given.pairs, "commit": given.commit}
             made = make(given.folder, given.kind, given.count, given.seed, given.jobs, for_terminal(), **which)
             text = (
                 f"{len(made['cases'])} {given.kind} cases in {given.folder}\nkeys sealed, sha256 {made['keys_sha256']}"
@@ -73,7 +76,8 @@ says what simpler ways of answering would have said on the same cases.
             found = compare(given.folder, given.out, progress=for_terminal())
             return Reply(found, (given.out or given.folder).joinpath("rivals.csv").read_text())
         found = grade(given.folder, given.out)
-        figures(found, given.out or given.folder)
+        if found["kind"] != "rest":
+            figures(found, given.out or given.folder)
         lines = [f"{found['answered']} of {found['cases']} cases answered", ""]
         for name, r in found["rates"].items():
             if r["of"]:

@@ -1,0 +1,102 @@
+"""One answer to a case with a rest held against its key: effects named in spite of it, its size, its place."""
+
+import math
+from dataclasses import dataclass
+
+from tissuejax.challenge.places import agreement, stated
+from tissuejax.challenge.verdicts import SETTLED, names_in
+
+NO_PROCESS = ("energy-form", "specimen-scatter")  # claim no process in tissue or rig; reported apart on a rest alone
+FACTOR = 1.5  # within which the size of a rest counts as right
+
+
+@dataclass(frozen=True)
+class RestMark:
+    """How one case with a rest was answered.
+
+    Attributes:
+        name, category: the case ("one", "two", "rest").
+        truth: effects in it.
+        laws: of the rest.
+        ratio: rest over the weakest effect, or over the size that an effect would have had.
+        alike: two effects that look alike.
+        verdict, named: the answer.
+        best: names of the best attempt, given or not.
+        wrong: names neither of an effect in it nor true of a law of its rest.
+        right: all effects named and no wrong name; on a rest alone no wrong physical name.
+        tried: whether a set with exactly these effects was fitted; None where the result doesn't list its sets.
+        rest_over_true: stated size of the rest over the true one, rms; nan where none is stated.
+        where: (right, false, missed) places, recordings and phases together.
+        confidence: as stated, or nan.
+        kept_ratio: rms error on the recording that nothing read over the rms of the true rest there; nan if unknown.
+        seconds: wall time.
+    """
+
+    name: str
+    category: str
+    truth: tuple[str, ...]
+    laws: tuple[str, ...]
+    ratio: float
+    alike: bool
+    verdict: str
+    named: tuple[str, ...]
+    best: tuple[str, ...]
+    wrong: tuple[str, ...]
+    right: bool
+    tried: bool | None
+    rest_over_true: float
+    where: tuple[int, int, int]
+    confidence: float
+    kept_ratio: float
+    seconds: float
+
+
+def rest_size(result: dict) -> float:
+    """Rms of the rest that a result states, Pa; nan where it states none."""
+    told = result.get("rest")
+    value = told.get("rms") if isinstance(told, dict) else None
+    return float(value) if isinstance(value, int | float) else math.nan
+
+
+def true_size(key: dict) -> float:
+    """Rms of the true rest beyond what the told energy can swallow, over all samples in the file, Pa."""
+    squares = sum(key["rest"]["beyond_rms"][n] ** 2 * k for n, k in key["samples"].items())
+    return math.sqrt(squares / sum(key["samples"].values()))
+
+
+def mark_rest(name: str, key: dict, result: dict, seconds: float = math.nan, kept: float = math.nan) -> RestMark:
+    """Compare an answer with the key.
+
+    Args:
+        kept: rms error of the prediction of the recording kept back, Pa.
+    """
+    truth, verdict = tuple(key["effects"]), str(result.get("verdict"))
+    named = names_in(result.get("effects")) if verdict in SETTLED else ()
+    best = named or names_in(result.get("best_attempt"))
+    allowed = set(truth) | set(key["tolerated"]) | (set() if truth else set(NO_PROCESS))
+    wrong = tuple(n for n in named if n not in allowed)
+    tried = None
+    if isinstance(result.get("sets"), list):
+        tried = any({k.split("/")[0] for k in s["effects"]} == set(truth) for s in result["sets"])
+    recordings, phases = stated(result.get("located") or ())
+    a, b = agreement(key["where"]["recordings"], recordings), agreement(key["where"]["phases"], phases)
+    confidence = result.get("confidence")
+    return RestMark(
+        name=name,
+        category=key["category"],
+        truth=truth,
+        laws=tuple(key["rest"]["laws"]),
+        ratio=key["rest"]["ratio"],
+        alike=bool(key["alike"]),
+        verdict=verdict,
+        named=named,
+        best=best,
+        wrong=wrong,
+        right=verdict != "failed" and not wrong and set(truth) <= set(named),
+        tried=tried,
+        rest_over_true=rest_size(result) / true_size(key),
+        where=(a[0] + b[0], a[1] + b[1], a[2] + b[2]),
+        confidence=float(confidence) if isinstance(confidence, int | float) else math.nan,
+        kept_ratio=kept / key["kept_rms"]["rest"],
+        seconds=seconds,
+    )
