@@ -1,7 +1,7 @@
 """Does the proposed experiment settle what the recordings leave open? Simulated from a truth by other code.
 
 Recordings are made that two explanations fit alike; the diagnosis says "ambiguous" and proposes a protocol; the
-protocol is simulated from the truth by the closed forms of the challenge, which share nothing with the diagnosis, and
+protocol is simulated from the truth by the closed forms of the challenge, which share no code with the diagnosis, and
 the diagnosis runs again with that recording. As a control the first recording is made once more instead.
 
 tissuejax study fits/next-experiment

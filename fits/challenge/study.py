@@ -1,0 +1,112 @@
+"""All sealed sets together, none left out: rates, stated confidence, and what the laws were, from the graded tables.
+
+`earlier/` holds the graded tables of sets that later ones replaced in the folders beside it.
+
+tissuejax study fits/challenge
+"""
+
+import csv
+import json
+from pathlib import Path
+
+from tissuejax.challenge.rates import STATED, rate
+from tissuejax.storage import write_json, write_text
+
+VISIBLE = 3.0
+BEGIN, END = "<!-- pooled: written by the study -->", "<!-- end of pooled -->"
+CURRENT = {
+    "material": ("material", "material-second", "material-third", "material-fourth"),
+    "probing": ("probing", "probing-strong", "probing-strong-second", "probing-pairs", "probing-second",
+                "probing-strong-third"),
+}  # fmt: skip
+
+
+def sets(folder: Path, kind: str) -> dict[str, list[dict]]:
+    """Rows of every sealed set of a kind, by a name that holds its seed."""
+    found = {p.stem.replace("-", " ", 1): p for p in sorted((folder / "earlier").glob(f"{kind}-*.csv"))}
+    for name in CURRENT[kind]:
+        seed = json.loads((folder / name / "graded.json").read_text())["seed"]
+        found[f"{kind} {seed}"] = folder / name / "graded.csv"
+    out = {}
+    for name, path in found.items():
+        with path.open() as file:
+            out[name] = list(csv.DictReader(file))
+    return out
+
+
+def true(row: dict, column: str) -> bool:
+    """Whether a cell says so."""
+    return row.get(column) == "True"
+
+
+def counted(rows: list[dict]) -> dict:
+    """The rates of the tables, over any rows."""
+
+    def seen(category: str) -> list[dict]:
+        return [r for r in rows if r["category"] == category and float(r["size"]) >= VISIBLE]
+
+    def of(category: str) -> list[dict]:
+        return [r for r in rows if r["category"] == category]
+
+    return {
+        "visible singles: right and no other": rate(seen("one"), lambda r: true(r, "exact")),
+        "visible pairs: both named": rate(seen("two"), lambda r: true(r, "all_named")),
+        "triples: all named": rate(of("three"), lambda r: true(r, "all_named")),
+        "nulls: false alarm": rate(of("none"), lambda r: not true(r, "right")),
+        "outside the catalogue: unexplained": rate(of("unknown"), lambda r: true(r, "right")),
+    }
+
+
+def confidence(rows: list[dict]) -> dict:
+    """Stated against right, and the expected calibration error."""
+    stated = [r for r in rows if r["confidence"] not in ("", "nan")]
+    bins = []
+    for low, high in zip(STATED, STATED[1:]):
+        here = [r for r in stated if low <= float(r["confidence"]) < high or (high == 1 == float(r["confidence"]))]
+        if here:
+            mean = sum(float(r["confidence"]) for r in here) / len(here)
+            bins.append({"from": low, "to": high, "stated": mean} | rate(here, lambda r: true(r, "right")))
+    error = sum(b["of"] * abs(b["stated"] - b["share"]) for b in bins) / max(len(stated), 1)
+    return {"bins": bins, "expected_calibration_error": error, "of": len(stated)}
+
+
+def share(r: dict) -> str:
+    """42 of 44 (95 %)."""
+    return f"{round(r['share'] * r['of'])} of {r['of']} ({r['share']:.0%})" if r["of"] else "-"
+
+
+def main(folder: Path) -> str:
+    """Count, write pooled.json and the tables in README.md."""
+    found, lines = {}, []
+    for kind in CURRENT:
+        each = sets(folder, kind)
+        rows = [r for some in each.values() for r in some]
+        by_set = {name: counted(some) for name, some in each.items()}
+        found[kind] = {"sets": by_set, "all": counted(rows), "confidence": confidence(rows), "cases": len(rows)}
+        names = list(found[kind]["all"])
+        lines += ["", "| sealed set (seed) | cases | " + " | ".join(names) + " |", "|---" * (len(names) + 2) + "|"]
+        for name, r in by_set.items():
+            lines.append(f"| {name} | {len(each[name])} | " + " | ".join(share(r[n]) for n in names) + " |")
+        total = found[kind]["all"]
+        lines.append(
+            f"| **all {len(each)}** | {len(rows)} | " + " | ".join(f"**{share(total[n])}**" for n in names) + " |"
+        )
+        told = found[kind]["confidence"]
+        lines += ["", f"Stated confidence of all {told['of']} answers that state one (expected calibration error "
+                  f"{told['expected_calibration_error']:.2f}):", "", "| stated | mean | right | 95 % interval |",
+                  "|---|---|---|---|"]  # fmt: skip
+        for b in told["bins"]:
+            lines.append(
+                f"| {b['from']:g} to {b['to']:g} | {b['stated']:.2f} | {share(b)} | {b['low']:.0%} to {b['high']:.0%} |"
+            )
+    write_json(folder / "pooled.json", found)
+    readme = folder / "README.md"
+    text = readme.read_text()
+    head, _, rest = text.partition(BEGIN)
+    _, _, tail = rest.partition(END)
+    write_text(readme, f"{head}{BEGIN}" + "\n".join(lines) + f"\n{END}{tail}")
+    return "; ".join(f"{k}: singles {share(f['all']['visible singles: right and no other'])}" for k, f in found.items())
+
+
+if __name__ == "__main__":
+    print(main(Path(__file__).parent))
