@@ -24,6 +24,7 @@ FLOORS = [
     {"tled"},
     {"effects"},
     {"model"},
+    {"cards"},
     {"experiments"},
     {"surrogate"},
     {"estimation"},

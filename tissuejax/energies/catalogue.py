@@ -15,7 +15,11 @@ from tissuejax.errors import InputError, unknown
 from tissuejax.families import members
 from tissuejax.parameters import Parameter
 
-ALIASES = {"yeoh": "reduced-polynomial-3"}
+ALIASES = {
+    "yeoh": "reduced-polynomial-3",
+    "holzapfel-gasser-ogden": "hgo",
+    "gasser-ogden-holzapfel": "goh",
+}
 
 
 def energies() -> dict[str, type[Energy]]:

@@ -28,6 +28,7 @@ class WithFibre(Energy):
     shear_modulus: ClassVar[str] = "that of the matrix"
     source: ClassVar[str] = "Gasser, Ogden and Holzapfel 2006, eq. 3.5"
     isotropic: ClassVar[bool] = False
+    families: ClassVar[int] = 1
     matrix: Energy
 
     @property
@@ -41,17 +42,24 @@ class WithFibre(Energy):
         )
 
     def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
-        kappa = p["kappa"]
-        direction = (jnp.cos(p["angle"]), jnp.sin(p["angle"]))
-        E = kappa * (strain.I1 - 3) + (1 - 3 * kappa) * (strain.fibre_stretch_squared(*direction) - 1)
-        tension = _positive(E)
-        return self.matrix.isochoric(p, strain) + 0.5 * p["k1"] / p["k2"] * expm1(p["k2"] * tension**2)
+        return self.matrix.isochoric(p, strain) + family(p, strain, p["kappa"], p["angle"])
 
     def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
         return self.matrix.initial_shear_modulus(p)
 
     def margin(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
         return self.matrix.margin(p, strain)
+
+    def angles(self, p: Mapping[str, Array]) -> tuple[Array, ...]:
+        """Direction of each family from axis 1 to 2, rad."""
+        return (p["angle"],)
+
+
+def family(p: Mapping[str, Array], strain: Strain, kappa: Array | float, angle: Array) -> Float[Array, "..."]:
+    """Energy of one family, k1/(2 k2) (exp(k2 <E>^2) - 1), Pa, with dispersion `kappa` about `angle`."""
+    along = strain.fibre_stretch_squared(jnp.cos(angle), jnp.sin(angle))
+    E = kappa * (strain.I1 - 3) + (1 - 3 * kappa) * (along - 1)
+    return 0.5 * p["k1"] / p["k2"] * expm1(p["k2"] * _positive(E) ** 2)
 
 
 def _positive(E: Float[Array, "..."]) -> Float[Array, "..."]:

@@ -1,0 +1,1 @@
+"""Material cards for other solvers, one solver a file, found by walking this folder."""

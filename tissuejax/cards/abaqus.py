@@ -1,0 +1,104 @@
+"""ABAQUS: *HYPERELASTIC, *ANISOTROPIC HYPERELASTIC and *VISCOELASTIC, TIME=PRONY."""
+
+import math
+from typing import ClassVar
+
+from tissuejax.cards.card import Card, number, row, rows
+from tissuejax.cards.material import POWERS, Material
+from tissuejax.errors import InputError
+
+MOST = 6  # terms of an Ogden or polynomial energy
+
+
+class Abaqus(Card):
+    """Polynomial, reduced polynomial, Ogden, Arruda-Boyce, and neo-Hookean with Holzapfel-Gasser-Ogden fibres."""
+
+    name: ClassVar[str] = "abaqus"
+    suffix: ClassVar[str] = ".inp"
+    comment: ClassVar[tuple[str, str]] = ("**", "")
+    volume: ClassVar[str] = POWERS
+    ogden: ClassVar[str] = "2mu/alpha^2"
+    relaxes: ClassVar[str] = (
+        "MODULI=INSTANTANEOUS: constants are those before relaxation; Prony rows are g_i, k_i, tau_i, shares of them"
+    )
+    source: ClassVar[str] = "Abaqus Analysis User's Guide, Hyperelastic behavior of rubberlike materials"
+
+    def lines(self, subject: Material) -> list[str]:
+        """*MATERIAL with what belongs below it."""
+        body = [f"*MATERIAL, NAME={subject.name}"]
+        if subject.density is not None:
+            body += ["*DENSITY", number(subject.density)]
+        return body + hyperelastic(self, subject, MOST, MOST, moduli=bool(subject.prony)) + _prony(subject)
+
+
+def hyperelastic(
+    card: Card, subject: Material, most_ogden: int, most: int, moduli: bool = False, unused: float = 0.0
+) -> list[str]:
+    """The *HYPERELASTIC block, which CalculiX shares (with fewer terms).
+
+    Args:
+        unused: what stands for a compressibility D_i that the energy does not have.
+
+    Raises:
+        InputError: no card for this energy, or more terms than it takes.
+    """
+    tail = ", MODULI=INSTANTANEOUS" if moduli else ""
+    kind, terms = subject.energy.name, subject.polynomial()
+    order = getattr(subject.energy, "order", 1)
+    limit = most_ogden if kind == "ogden" else most
+    if order > limit:
+        raise InputError(f"{card.name} takes {kind} up to order {limit}, this one has {order}; fit fewer terms")
+    if kind == "neo-hookean":
+        return [f"*HYPERELASTIC, NEO HOOKE{tail}", row([terms[1, 0], *subject.compressibilities(1)])]
+    if kind == "mooney-rivlin":
+        return [
+            f"*HYPERELASTIC, MOONEY-RIVLIN{tail}",
+            row([terms[1, 0], terms[0, 1], *subject.compressibilities(1)]),
+        ]
+    if terms is not None:
+        word = "POLYNOMIAL" if kind == "polynomial" else "REDUCED POLYNOMIAL"
+        D = subject.compressibilities(order)
+        D += [unused] * (order - len(D))
+        return [f"*HYPERELASTIC, {word}, N={order}{tail}", *rows([*terms.values(), *D])]
+    if kind == "ogden":
+        D = subject.compressibilities(order)
+        D += [unused] * (order - len(D))
+        pairs = [x for pair in subject.ogden(card.ogden) for x in pair]
+        return [f"*HYPERELASTIC, OGDEN, N={order}{tail}", *rows([*pairs, *D])]
+    if kind == "arruda-boyce":
+        D = subject.compressibilities(1)
+        constants = [subject.constants["mu"], subject.constants["lambda_m"], *D]
+        return [
+            "** volumetric energy of this law: U = ((J^2-1)/2 - ln J) / D",
+            f"*HYPERELASTIC, ARRUDA-BOYCE{tail}",
+            row(constants),
+        ]
+    if getattr(subject.energy, "families", 0) and not moduli and card.name == "abaqus" and neo_hookean(subject):
+        return _fibres(subject)
+    raise card.none(subject)
+
+
+def neo_hookean(subject: Material) -> bool:
+    """Whether the matrix around the fibres is neo-Hookean."""
+    return getattr(subject.energy, "matrix", None) is None or subject.energy.matrix.name == "neo-hookean"
+
+
+def _fibres(subject: Material) -> list[str]:
+    """*ANISOTROPIC HYPERELASTIC, HOLZAPFEL: C10, D, k1, k2, kappa; families share k1, k2 and kappa."""
+    k1, k2, kappa = (float(subject.constants.get(n, 0.0)) for n in ("k1", "k2", "kappa"))
+    angles = [float(a) for a in subject.energy.angles(subject.constants)]
+    D = subject.compressibilities(1)
+    directions = [f"{number(math.cos(a))}, {number(math.sin(a))}, 0." for a in angles]
+    return [
+        "** volumetric energy of this law: U = ((J^2-1)/2 - ln J) / D",
+        f"** local directions of the families, for *ORIENTATION, LOCAL DIRECTIONS={len(angles)}:",
+        *(f"**   {d}" for d in directions),
+        f"*ANISOTROPIC HYPERELASTIC, HOLZAPFEL, LOCAL DIRECTIONS={len(angles)}",
+        row([0.5 * subject.constants["mu"], *D, k1, k2, kappa]),
+    ]
+
+
+def _prony(subject: Material) -> list[str]:
+    if not subject.prony:
+        return []
+    return ["*VISCOELASTIC, TIME=PRONY", *(row([g, 0.0, tau]) for g, tau in subject.prony)]

@@ -1,0 +1,75 @@
+"""`tissuejax export`: a fitted or published material as a card for another solver."""
+
+import argparse
+from pathlib import Path
+from typing import ClassVar
+
+from tissuejax.cards.catalogue import card, cards
+from tissuejax.cards.material import UNITS, material
+from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.results import add_source, known
+from tissuejax.errors import InputError
+from tissuejax.storage import write_text
+from tissuejax.units import quantity
+
+
+class Export(Command):
+    """Write cards."""
+
+    name: ClassVar[str] = "export"
+    order: ClassVar[int] = 36
+    summary: ClassVar[str] = "a material card for ABAQUS, FEBio, LS-DYNA, ANSYS, CalculiX or SOFA"
+    teaches: ClassVar[str] = """
+Write a fitted or published material as a card that another solver reads. The Ogden form, the volumetric energy and the
+meaning of the Prony series are converted to the solver's own and named in the comments of the card. A law that a solver
+has no card for is refused with the reason.
+
+  tissuejax export out/liver/result.json                              a card for every solver that has one
+  tissuejax export out/liver/result.json --to abaqus --units mm-t-s
+  tissuejax export --published in-vivo-3 --to febio
+  tissuejax export --energy neo-hookean --set "energy.mu=3 kPa" --to calculix --bulk "150 kPa" --density "1060 kg/m^3"
+
+Rig and sensor effects of the fit (slack, drift, ...) are left out with a note. An incompressible fit stays so where the
+solver can; elsewhere it gets a bulk modulus of 1000 shear moduli, said in the card, or the one of --bulk.
+"""
+
+    def arguments(self, parser: argparse.ArgumentParser) -> None:
+        """A material, --to, units, density, bulk modulus and --out."""
+        add_source(parser)
+        parser.add_argument("--to", action="append", metavar="SOLVER", help=f"{', '.join(sorted(cards()))} (repeat)")
+        parser.add_argument("--units", default="m-kg-s", metavar="SET", help=f"{', '.join(UNITS)} (default m-kg-s)")
+        parser.add_argument("--density", metavar="VALUE", help='e.g. "1060 kg/m^3"')
+        parser.add_argument("--bulk", metavar="VALUE", help='bulk modulus for an incompressible fit, e.g. "150 kPa"')
+        parser.add_argument("--name", metavar="NAME", help="of the material in the card (default: the sample's)")
+        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="default: out/NAME-cards")
+
+    def run(self, given: argparse.Namespace) -> Reply:
+        """Convert, write, say what was refused."""
+        of = known(given)
+        density = None if given.density is None else quantity(given.density, "kg/m^3", "--density")
+        bulk = None if given.bulk is None else quantity(given.bulk, "Pa", "--bulk")
+        name = given.name or of.name
+        subject = material(of.model, of.values, name, density, given.units, bulk)
+        out, written, refused = given.out or Path("out") / f"{name}-cards", {}, {}
+        for solver in given.to or cards():
+            try:
+                text = card(solver).text(subject)
+            except InputError as error:
+                if given.to:
+                    raise
+                refused[solver] = str(error)
+                continue
+            written[solver] = write_text(out / f"{subject.name}-{solver}{card(solver).suffix}", text)
+        if not written:
+            raise InputError("no solver has a card: " + "; ".join(refused.values()))
+        lines = [f"{solver:<10}{path}" for solver, path in written.items()]
+        lines += [f"  ! {solver}: {why}" for solver, why in refused.items()]
+        lines += [f"  ! {note}" for note in subject.notes]
+        warned = [w for w in of.record.get("warnings", ()) if "bound" in w or "unstable" in w.lower()]
+        lines += [f"  ! of the fit: {warning}" for warning in warned]
+        record = {
+            "cards": {s: str(p) for s, p in written.items()},
+            "refused": refused,
+            "notes": list(subject.notes) + warned,
+        }
+        return Reply(record, "\n".join(lines))

@@ -1,0 +1,103 @@
+"""Reading back what a fit wrote: the model and its values, and the same from a published material or from options."""
+
+import argparse
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from tissuejax import verbs
+from tissuejax.commands.arguments import values as valued
+from tissuejax.energies.published import published
+from tissuejax.errors import InputError
+from tissuejax.model import Model
+from tissuejax.parameters import checked
+
+NOT_A_RESULT = "not a result.json of `tissuejax fit`"
+
+
+@dataclass(frozen=True)
+class Known:
+    """A model with a value for every parameter, SI.
+
+    Attributes:
+        name: of the sample or the material.
+        model, values: what it is.
+        record: the result it came from, {} for a material that was never fitted.
+    """
+
+    name: str
+    model: Model
+    values: dict[str, float]
+    record: dict
+
+
+def add_source(parser: argparse.ArgumentParser) -> None:
+    """RESULT.json, --published or --energy with --set."""
+    parser.add_argument("result", nargs="?", type=Path, metavar="RESULT.json", help="a result of `tissuejax fit`")
+    parser.add_argument("--published", metavar="NAME", help="a published material, e.g. in-vivo-3")
+    parser.add_argument("--energy", "-e", metavar="NAME", help="an energy by name, its constants by --set")
+    parser.add_argument("--ogden-form", metavar="FORM", help="what Ogden constants mean")
+    parser.add_argument("--volumetric", metavar="NAME", help="quadratic, logarithmic or compressibility-N")
+    parser.add_argument("--effect", action="append", default=[], metavar="NAME", help="an effect to switch on")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="PATH=VALUE", help='a value, e.g. "energy.mu=3 kPa" (repeat)'
+    )
+
+
+def known(given: argparse.Namespace) -> Known:
+    """The model and values named by the arguments of `add_source`.
+
+    Raises:
+        InputError: none or several sources named, a file that is no result, an unknown name.
+    """
+    named = [given.result, given.published, given.energy]
+    if sum(n is not None for n in named) != 1:
+        raise InputError(
+            "say which material: RESULT.json, or --published NAME, or --energy NAME with --set (one of them)"
+        )
+    if given.result is not None:
+        found = read_result(given.result)
+    elif given.published is not None:
+        of = published(given.published)
+        found = Known(of.name, Model(of.energy, of.volumetric), dict(of.values), {})
+    else:
+        model = verbs.material(
+            given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
+        )
+        found = Known(given.energy, model, dict(model.defaults), {})
+    changed = valued(given.set, found.model.parameters, "--set")
+    return Known(found.name, found.model, found.values | checked(changed, found.model.parameters), found.record)
+
+
+def read_result(path: Path) -> Known:
+    """The model and values of a result.json.
+
+    Raises:
+        InputError: unreadable, or not a result of a fit.
+    """
+    try:
+        record = json.loads(Path(path).read_text())
+        energy, parameters = record["energy"], record["parameters"]
+        model = verbs.material(
+            energy["name"],
+            ogden_form=energy["forms"].get("ogden"),
+            volumetric=energy["volumetric"],
+            effects=effects_of(record),
+        )
+        values = {path: float(p["value"]) for path, p in parameters.items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{path}: {NOT_A_RESULT} ({error}); give the one in its --out") from error
+    model = model.across(tuple(record["recordings"]))
+    left = sorted(set(model.parameters) ^ set(values))
+    if left:
+        raise InputError(f"{path}: made by another version ({', '.join(left[:4])} differ); fit again")
+    return Known(str(record["sample"]), model, values, record)
+
+
+def effects_of(record: dict) -> list[str]:
+    """Names of the effects as they are typed, a Prony series with its number of terms."""
+    found = []
+    for name in record["effects"]:
+        terms = sum(p.startswith(f"effects.{name}.g") for p in record["parameters"])
+        found.append(f"{name}-{terms}" if name == "viscoelasticity" and terms != 2 else name)
+    return found

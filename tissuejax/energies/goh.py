@@ -1,0 +1,63 @@
+"""Gasser-Ogden-Holzapfel: two families of fibres that scatter about their directions."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from jaxtyping import Array, Float
+
+from tissuejax.energies.energy import Energy
+from tissuejax.energies.fibre import family
+from tissuejax.energies.strain import Strain
+from tissuejax.parameters import Parameter
+
+
+class GasserOgdenHolzapfel(Energy):
+    """psi = mu/2 (I1bar - 3) + k1/(2 k2) sum_(i=4,6) (exp(k2 <E_i>^2) - 1).
+
+    E_i = kappa (I1bar - 3) + (1 - 3 kappa) (I_i bar - 1), families at angle +- spread. With kappa 0 it
+    is Holzapfel-Gasser-Ogden, with 1/3 isotropic. Shear modulus at rest mu.
+    Source: Gasser, Ogden and Holzapfel 2006, J. R. Soc. Interface 3, eq. 3.5 and 3.8 (c = mu).
+    """
+
+    name: ClassVar[str] = "goh"
+    formula: ClassVar[str] = (
+        "mu/2 (I1bar - 3) + k1/(2 k2) sum_(i=4,6) (exp(k2 <E_i>^2) - 1), "
+        "E_i = kappa (I1bar - 3) + (1 - 3 kappa) (I_i bar - 1)"
+    )
+    shear_modulus: ClassVar[str] = "mu"
+    source: ClassVar[str] = "Gasser, Ogden and Holzapfel 2006, eq. 3.5"
+    isotropic: ClassVar[bool] = False
+    families: ClassVar[int] = 2
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (
+            Parameter("mu", "Pa", 1000.0, lower=0.0, meaning="shear modulus of the matrix"),
+            Parameter("k1", "Pa", 1000.0, lower=0.0, meaning="stiffness of the fibres"),
+            Parameter("k2", "1", 1.0, lower=0.0, upper=1e3, meaning="stiffening of the fibres"),
+            Parameter("kappa", "1", 0.1, lower=0.0, upper=1 / 3, meaning="dispersion: 0 aligned, 1/3 isotropic"),
+            Parameter(
+                "spread", "rad", 0.6, lower=0.0, upper=1.6, scale=1.0, meaning="half the angle between the families"
+            ),
+            Parameter(
+                "angle",
+                "rad",
+                0.0,
+                lower=-3.2,
+                upper=3.2,
+                scale=1.0,
+                meaning="direction midway, from axis 1 to 2",
+                frozen=True,
+            ),
+        )
+
+    def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+        fibres = sum(family(p, strain, p["kappa"], angle) for angle in self.angles(p))
+        return 0.5 * p["mu"] * (strain.I1 - 3) + fibres
+
+    def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+        return p["mu"]
+
+    def angles(self, p: Mapping[str, Array]) -> tuple[Array, ...]:
+        """Direction of each family from axis 1 to 2, rad."""
+        return p["angle"] + p["spread"], p["angle"] - p["spread"]

@@ -1,0 +1,59 @@
+"""Holzapfel-Gasser-Ogden: neo-Hookean with two aligned families of fibres, for arteries."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from jaxtyping import Array, Float
+
+from tissuejax.energies.energy import Energy
+from tissuejax.energies.fibre import family
+from tissuejax.energies.strain import Strain
+from tissuejax.parameters import Parameter
+
+
+class HolzapfelGasserOgden(Energy):
+    """psi = mu/2 (I1bar - 3) + k1/(2 k2) sum_(i=4,6) (exp(k2 <I_i bar - 1>^2) - 1).
+
+    I4bar and I6bar are squared isochoric stretches along angle +- spread in the plane of axes 1 and 2; <E> is 0 in
+    compression (with the smooth onset of `fibre.py`). Shear modulus at rest mu: fibres add nothing there.
+    Source: Holzapfel, Gasser and Ogden 2000, J. Elasticity 61, eqs. 62 to 65 (c = mu).
+    """
+
+    name: ClassVar[str] = "hgo"
+    formula: ClassVar[str] = "mu/2 (I1bar - 3) + k1/(2 k2) sum_(i=4,6) (exp(k2 <I_i bar - 1>^2) - 1)"
+    shear_modulus: ClassVar[str] = "mu"
+    source: ClassVar[str] = "Holzapfel, Gasser and Ogden 2000"
+    isotropic: ClassVar[bool] = False
+    families: ClassVar[int] = 2
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (
+            Parameter("mu", "Pa", 1000.0, lower=0.0, meaning="shear modulus of the matrix"),
+            Parameter("k1", "Pa", 1000.0, lower=0.0, meaning="stiffness of the fibres"),
+            Parameter("k2", "1", 1.0, lower=0.0, upper=1e3, meaning="stiffening of the fibres"),
+            Parameter(
+                "spread", "rad", 0.6, lower=0.0, upper=1.6, scale=1.0, meaning="half the angle between the families"
+            ),
+            Parameter(
+                "angle",
+                "rad",
+                0.0,
+                lower=-3.2,
+                upper=3.2,
+                scale=1.0,
+                meaning="direction midway, from axis 1 to 2",
+                frozen=True,
+            ),
+        )
+
+    def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+        fibres = sum(family(p, strain, 0.0, angle) for angle in self.angles(p))
+        return 0.5 * p["mu"] * (strain.I1 - 3) + fibres
+
+    def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+        return p["mu"]
+
+    def angles(self, p: Mapping[str, Array]) -> tuple[Array, ...]:
+        """Direction of each family from axis 1 to 2, rad."""
+        return p["angle"] + p["spread"], p["angle"] - p["spread"]
