@@ -95,12 +95,23 @@ def answer(folder: Path, name: str, energy: str) -> str:
 
 
 def diagnosed(path: Path, energy: str, out: Path) -> None:
-    """The one place where the challenge calls the diagnosis: leaves `out`/result.json."""
+    """The one place where the challenge calls the diagnosis: leaves `out`/result.json.
+
+    Where a recording was kept back, what the repaired model says of it is left in `out`/kept.json.
+    """
     import jax
 
+    from tissuejax.challenge.kept import foretold
     from tissuejax.diagnosis.diagnose import diagnose
 
     jax.config.update("jax_enable_x64", True)
-    diagnose(path, energy=energy, out=out)
+    found = diagnose(path, energy=energy, out=out)
     if not (out / "result.json").exists():
         raise FileNotFoundError(f"the diagnosis left no result.json in {out}")
+    kept = path.parents[1] / "kept" / path.name
+    if kept.exists():
+        try:
+            said = {"nominal_stress": foretold(found, path, energy, kept).tolist()}
+        except Exception as error:  # the verdict stands without it
+            said = {"nominal_stress": [], "error": f"{type(error).__name__}: {error}"}
+        write_json(out / "kept.json", said)
