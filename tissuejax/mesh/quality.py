@@ -98,12 +98,13 @@ def _place(points, index) -> str:
     return f"({x:.1f}, {y:.1f}, {z:.1f}) mm"
 
 
-def refuse_bad(geometry: Geometry, needs_support: bool = True) -> Quality:
+def refuse_bad(geometry: Geometry, needs_support: bool = True, joined: Int[np.ndarray, "J 2"] | None = None) -> Quality:
     """Measure a mesh and refuse one that can't be simulated, with the place.
 
     Args:
         geometry: points, cells and fixed nodes.
         needs_support: whether the fixed nodes have to hold the body against floating.
+        joined: pairs of nodes that something else holds together (faces of a cut), so that they count as one piece.
 
     Raises:
         InputError: an index out of range, a size that means wrong units, an inverted or flat cell, points in no cell,
@@ -133,10 +134,9 @@ def refuse_bad(geometry: Geometry, needs_support: bool = True) -> Quality:
             f"{len(lonely)} points belong to no cell, first point {lonely[0]} at {_place(points, lonely[:1])}; "
             "remove them"
         )
-    star = coo_array(
-        (np.ones(cells[:, 1:].size), (np.repeat(cells[:, 0], cells.shape[1] - 1), cells[:, 1:].ravel())),
-        shape=(len(points), len(points)),
-    )
+    pairs = np.stack([np.repeat(cells[:, 0], cells.shape[1] - 1), cells[:, 1:].ravel()], 1)
+    pairs = pairs if joined is None else np.concatenate([pairs, joined])
+    star = coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=(len(points), len(points)))
     pieces, label = connected_components(star, directed=False)
     if pieces > 1:
         small = np.flatnonzero(label == np.bincount(label).argmin())

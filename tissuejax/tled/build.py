@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from tissuejax import elements
 from tissuejax.elements.hex8 import Hex8, straight
@@ -66,6 +66,7 @@ def scene(
     held: Float[np.ndarray, "F 3"] | None = None,
     patch: Float[np.ndarray, "P v"] | None = None,
     softness: float | None = None,
+    joined: Int[np.ndarray, "J 2"] | None = None,
 ) -> Scene:
     """A scene with every optional slot empty.
 
@@ -83,12 +84,13 @@ def scene(
         stiffness_damping: beta, s; 5e-5 s for forward tangents of slow runs.
         gravity: m/s^2. markers: points to follow. held: which axes of the fixed nodes are held (all).
         patch: nodes of the facets that may touch (automatic).
+        joined: pairs of nodes that cohesive faces hold together, so that both halves count as one body.
 
     Raises:
         InputError: a bad mesh, a step above the critical one, a probe that starts inside the tissue or never comes
             near, output times that are not uniform, a missing radius, values that are not positive.
     """
-    refuse_bad(geometry)
+    refuse_bad(geometry, joined=joined)
     times = np.asarray(times, float)
     interval = _interval(times)
     if not density > 0:

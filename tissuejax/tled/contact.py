@@ -63,12 +63,14 @@ def untouched(probe: Probe) -> Grip:
 
 
 class Touch(NamedTuple):
-    """Result of `forces`: `nodal` (3, N) on the tissue, `force` and `torque` on the probe, and the memory."""
+    """Result of `forces`: `nodal` (3, N) on the tissue, `force` and `torque` on the probe, the memory, and what
+    friction lost by sliding in this step, J (None without friction)."""
 
     nodal: Float[Array, "3 N"]
     force: Float[Array, " 3"]
     torque: Float[Array, " 3"]
     grip: Grip
+    rubbed: Float[Array, ""] | None = None
 
 
 def places(patch: Patch, u: Float[Array, "3 N"], centre: Float[Array, " 3"], shape: np.ndarray):
@@ -96,8 +98,10 @@ def forces(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Arr
         opening = jnp.maximum(gap, 0.0) / probe.reach
         push = pressure - probe.adhesion * bond * opening * jnp.exp(1.0 - opening)
     traction, anchor = tuple(push * n for n in normal), grip.anchor  # on the tissue: away from the probe
+    rubbed = None
     if probe.friction is not None:
-        drag, anchor = _friction(probe, x, normal, pressure, anchor)
+        drag, anchor, lost = _friction(probe, x, normal, pressure, anchor)
+        rubbed = jnp.sum(lost * probe.area)
         traction = tuple(t + d for t, d in zip(traction, drag, strict=True))
     f = barrier(jnp.stack(traction) * probe.area)  # (3, q, P)
     arm = barrier(jnp.stack(x))
@@ -106,11 +110,12 @@ def forces(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Arr
     weights = jnp.asarray(shape, f.dtype)[:, :, None]
     at_nodes = barrier(sum(weights[q] * f[:, q][:, None] for q in range(shape.shape[0])))
     nodal = jnp.zeros_like(u).at[:, patch.nodes].add(at_nodes, mode="promise_in_bounds")
-    return Touch(nodal, -total, -torque, Grip(anchor, bond))
+    return Touch(nodal, -total, -torque, Grip(anchor, bond), rubbed)
 
 
 def _friction(probe, x, normal, pressure, anchor):
-    """Traction of the tangential springs after sliding, and where they are anchored now (relative to the probe)."""
+    """Traction of the tangential springs after sliding, where they are anchored now (relative to the probe), and the
+    energy that they gave up by sliding, J/m^2."""
     stretch = tuple(a - b for a, b in zip(x, anchor, strict=True))
     along = sum(s * n for s, n in zip(stretch, normal, strict=True))
     stretch = tuple(s - along * n for s, n in zip(stretch, normal, strict=True))
@@ -122,7 +127,8 @@ def _friction(probe, x, normal, pressure, anchor):
     kept = jnp.where(some, jnp.minimum(1.0, limit / length), 1.0)
     kept_stretch = tuple(kept * s for s in stretch)
     anchor = tuple(a - s for a, s in zip(x, kept_stretch, strict=True))
-    return tuple(-spring * s for s in kept_stretch), anchor
+    lost = spring * square * kept * (1.0 - kept)  # traction times slide; none where nothing presses
+    return tuple(-spring * s for s in kept_stretch), anchor, lost
 
 
 def depth(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Array, " 3"]) -> Float[Array, ""]:
@@ -142,3 +148,14 @@ def energy(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Arr
     series = sum((-1) ** (k + 1) * small**k / k**2 for k in range(1, 40))
     integral = jnp.where(z > 0, z * z / 2 + jnp.pi**2 / 6 - series, series)
     return jnp.sum(probe.area * probe.penalty * probe.softness**2 * integral)
+
+
+def gripped(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Array, " 3"], grip: Grip):
+    """Energy stored in the stick springs, J."""
+    shape, _ = quadrature(patch.nodes.shape[0])
+    x = places(patch, u, centre, shape)
+    gap, normal = probe.shape.distance(x)
+    pressure = probe.penalty * probe.softness * _softplus(-gap / probe.softness)
+    drag, _, _ = _friction(probe, x, normal, pressure, grip.anchor)
+    spring = probe.penalty / (1.0 + probe.penalty * probe.give)
+    return 0.5 * jnp.sum(probe.area * sum(d * d for d in drag)) / spring

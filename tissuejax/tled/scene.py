@@ -23,6 +23,7 @@ from tissuejax.elements.element import Element
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.volumetric import Volumetric
 from tissuejax.errors import unknown
+from tissuejax.tled.faces import Faces
 from tissuejax.tled.history import Damage, Prony
 from tissuejax.tled.shapes import Shape
 
@@ -189,7 +190,10 @@ class Settings(eqx.Module):
 
 
 class Scene(eqx.Module):
-    """The whole set-up; see the parts. `gravity` (m/s^2) acts on the mass of the tissue; None is none."""
+    """The whole set-up; see the parts. `gravity` (m/s^2) acts on the mass of the tissue; None is none.
+
+    `faces` holds the two sides of a split body together; with them the run keeps its energy balance.
+    """
 
     body: Body
     tissue: Tissue
@@ -199,6 +203,7 @@ class Scene(eqx.Module):
     probe: Probe | None = None
     markers: Markers | None = None
     gravity: Float[Array, " 3"] | None = None
+    faces: Faces | None = None
 
     def put(self, changes: Mapping[str, Any]) -> "Scene":
         """A copy with slots replaced, by dotted path: `scene.put({"tissue.stiffness": s, "probe.friction": 0.2})`.

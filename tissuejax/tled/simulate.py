@@ -25,6 +25,7 @@ from jaxtyping import Array, Float, Int
 
 from tissuejax.errors import UnstableSimulation
 from tissuejax.tled import contact, internal
+from tissuejax.tled.ledger import Balance, Spent, balance, look
 from tissuejax.tled.scene import Scene
 from tissuejax.tled.step import Drive, Felt, Machine, State, advance, machine, start
 
@@ -73,6 +74,7 @@ class Outcome(eqx.Module):
         failed: -1, or the frame by whose end the run had failed; `element`: where (inverted, or at the node that moved
             fastest when all was last finite).
         state: the final state, to go on from.
+        balance: energies and crack at the end of each frame, with cohesive faces; else None.
     """
 
     time: Float[Array, " n"]
@@ -87,6 +89,7 @@ class Outcome(eqx.Module):
     failed: Int[Array, ""]
     element: Int[Array, ""]
     state: State
+    balance: Balance | None = None
 
     @property
     def depth(self) -> Float[Array, ""]:
@@ -120,9 +123,13 @@ def proceed(m: Machine, state: State) -> Outcome:
             return (state, jax.tree.map(jnp.add, felt, new)), None
 
         zero = jnp.zeros(3, state.u.dtype)
-        (state, total), _ = jax.lax.scan(one, (state, Felt(zero, zero, zero, zero[0])), drive, length=clock.steps)
-        mean = Felt(*(x / clock.steps for x in total[:3]), total.work)
-        return state, (mean, _markers(scene, state.u), _pace(state))
+        none = Felt(zero, zero, zero, zero[0], None if scene.faces is None else Spent(*[zero[0]] * 5))
+        (state, total), _ = jax.lax.scan(one, (state, none), drive, length=clock.steps)
+        mean = Felt(*(x / clock.steps for x in total[:3]), total.work, total.spent)
+        looked = None
+        if scene.faces is not None:
+            looked = look(m, state, None if drive.centre is None else drive.centre[-1] + drive.stride[-1])
+        return state, (mean, _markers(scene, state.u), _pace(state), looked)
 
     def block(state, drive):
         state, out = jax.lax.scan(frame, state, drive, length=length)
@@ -137,9 +144,10 @@ def proceed(m: Machine, state: State) -> Outcome:
     else:
         numbered = (jnp.arange(blocks), drive)
         state, (series, checks) = jax.lax.scan(_while_needed(block, length, clock.needed), state, numbered)
-    felt, markers, pace = jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), series)
-    felt, markers = jax.tree.map(lambda x: x[: clock.frames], (felt, markers))
-    return _outcome(scene, felt, markers, pace, checks, length, state)
+    felt, markers, pace, looks = jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), series)
+    felt, markers, looks = jax.tree.map(lambda x: x[: clock.frames], (felt, markers, looks))
+    ledger = None if looks is None else balance(scene, felt.work, felt.spent, looks)
+    return _outcome(scene, felt, markers, pace, checks, length, state, ledger)
 
 
 def _while_needed(block, length: int, needed: Int[Array, ""]):
@@ -177,7 +185,9 @@ def drives(scene: Scene, frames: int) -> Drive:
         centre, stride = path[1:-1], 0.5 * (path[2:] - path[:-2])
     if support.displacement is not None:
         path = series(support.time, support.displacement, clock.start + real * jnp.arange(count + 1))
-        motion, pace = path[1:], (path[1:] - path[:-1]) / clock.step
+        motion = path[1:]
+        if support.pattern is None:  # parts that move apart carry no body along
+            pace = (path[1:] - path[:-1]) / clock.step
     return Drive(centre, stride, motion, pace)
 
 
@@ -218,7 +228,7 @@ def _checks(m: Machine, state: State, centre) -> Checks:
     return Checks(kinetic, energy, hourglass, deep, failed, worst)
 
 
-def _outcome(scene, felt, markers, pace, checks, length, state) -> Outcome:
+def _outcome(scene, felt, markers, pace, checks, length, state, ledger) -> Outcome:
     clock = scene.clock
     first = jnp.argmax(checks.failed)
     looked = (first + 1) * length - 1
@@ -234,6 +244,7 @@ def _outcome(scene, felt, markers, pace, checks, length, state) -> Outcome:
         time=middles, end_time=clock.ends, force=felt.force, torque=felt.torque, reaction=felt.reaction,
         work=jnp.cumsum(felt.work), markers=markers, checks=checks, check_time=clock.start + clock.interval * ends,
         failed=frame, element=jnp.where(bad, jnp.where(burst, near, checks.element[first]), -1), state=state,
+        balance=ledger,
     )  # fmt: skip
 
 

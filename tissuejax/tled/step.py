@@ -10,9 +10,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from tissuejax.tled import capsule, contact, internal, stable, support
+from tissuejax.tled import capsule, contact, faces, internal, stable, support
 from tissuejax.tled.glide import Glide, glide, spurred
 from tissuejax.tled.internal import barrier
+from tissuejax.tled.ledger import Spent
 from tissuejax.tled.scene import Scene
 
 
@@ -27,6 +28,7 @@ class Machine(NamedTuple):
     mass: Float[Array, " N"]
     weight: Float[Array, "3 N"] | None
     glide: Glide | None
+    seam: faces.Seam | None = None
 
 
 class State(NamedTuple):
@@ -38,6 +40,7 @@ class State(NamedTuple):
     grip: contact.Grip | None
     slip: support.Slip
     felt: Float[Array, " 3"] | None
+    opening: faces.Memory | None = None
 
 
 class Drive(NamedTuple):
@@ -51,12 +54,14 @@ class Drive(NamedTuple):
 
 
 class Felt(NamedTuple):
-    """What a step reports: force and torque on the probe, force on the support, work done by the probe."""
+    """What a step reports: force and torque on the probe, force on the support, work done by the probe, and with
+    cohesive faces what else was spent."""
 
     force: Float[Array, " 3"]
     torque: Float[Array, " 3"]
     reaction: Float[Array, " 3"]
     work: Float[Array, ""]
+    spent: Spent | None = None
 
 
 FEEL = 0.05  # share of the new force per step that a compliant machine answers to: keeps the loop stable
@@ -68,12 +73,14 @@ def machine(scene: Scene) -> Machine:
     probe = scene.probe
     stiffness = stable.nodal_stiffness(scene, mesh) if support.slips(scene) else None
     mass = mesh.mass if probe is None else mesh.mass + probe.mass
+    mass = mass if scene.faces is None else mass + scene.faces.mass
+    seam = None if scene.faces is None else faces.seam(scene.faces, scene.body.points)
     weight = None if scene.gravity is None else scene.gravity[:, None] * mesh.mass
     skin = None if scene.tissue.capsule is None else capsule.skin(scene.body)
     patch = None if probe is None else contact.patch(scene)
     hold = support.hold(scene, stiffness)
     slides = None if scene.support.compliance is None else glide(scene, mass, hold.area)
-    return Machine(scene, mesh, hold, patch, skin, mass, weight, slides)
+    return Machine(scene, mesh, hold, patch, skin, mass, weight, slides, seam)
 
 
 def start(m: Machine) -> State:
@@ -97,7 +104,8 @@ def start(m: Machine) -> State:
     grip = None if scene.probe is None else contact.untouched(scene.probe)
     compliant = scene.probe is not None and scene.probe.compliance is not None
     felt = jnp.zeros(3, u.dtype) if compliant else None
-    return State(u, v, internal.rest(scene, m.mesh), grip, support.bonded(scene), felt)
+    opening = None if scene.faces is None else faces.unopened(scene.faces)
+    return State(u, v, internal.rest(scene, m.mesh), grip, support.bonded(scene), felt, opening)
 
 
 def tissue_forces(m: Machine, u: Float[Array, "3 N"], history: internal.History, step):
@@ -121,13 +129,17 @@ def advance(m: Machine, state: State, drive: Drive) -> tuple[State, Felt]:
     outer = jnp.zeros_like(u) if m.weight is None else m.weight + 0.0
     zero = jnp.zeros(3, u.dtype)
     force = torque = zero
-    work, grip, felt = zero[0], state.grip, state.felt
+    work, grip, felt, opening = zero[0], state.grip, state.felt, state.opening
+    rubbed = lost = None
     if scene.probe is not None:
         centre = drive.centre if felt is None else drive.centre + scene.probe.compliance * felt
         touch = _touch(scene.probe, m.patch, u, centre, grip)
-        outer, grip = outer + touch.nodal, touch.grip
+        outer, grip, rubbed = outer + touch.nodal, touch.grip, touch.rubbed
         force, torque, work = touch.force, touch.torque, -jnp.sum(touch.force * drive.stride)
         felt = None if felt is None else felt + FEEL * (force - felt)
+    if scene.faces is not None:
+        held = jax.checkpoint(faces.forces, prevent_cse=False)(scene.faces, m.seam, u, opening)
+        outer, opening, lost = outer + held.nodal, held.memory, held.lost
     f = outer - inner
     half = 0.5 * settings.mass_damping * h
     moving = f if m.glide is None else spurred(scene, m.glide, f, state.slip.elastic, m.hold.area, m.mass)
@@ -140,7 +152,21 @@ def advance(m: Machine, state: State, drive: Drive) -> tuple[State, Felt]:
     pushed = jnp.where(m.hold.held, (moved - u) / h, pushed)
     moved, pushed = barrier((moved, pushed))
     reaction = jnp.sum(scene.body.held.T * f[:, scene.body.fixed], axis=1)  # force of the tissue on the support
-    return State(moved, pushed, history, grip, slip, felt), Felt(force, torque, reaction, work)
+    spent = None if lost is None else _spent(m, lost, rubbed, inner, f, v, pushed)
+    return State(moved, pushed, history, grip, slip, felt, opening), Felt(force, torque, reaction, work, spent)
+
+
+def _spent(m: Machine, lost, rubbed, inner, f, v, pushed) -> Spent:
+    """Losses and works of one step, J, at the mean of the speeds before and after."""
+    scene, zero = m.scene, jnp.zeros_like(lost)
+    h, mean = scene.clock.step, 0.5 * (v + pushed)
+    free = jnp.where(m.hold.held, 0.0, mean)
+    damping = scene.settings.mass_damping * h * jnp.sum(m.mass * free * free)
+    shove = zero
+    if scene.support.displacement is not None:
+        carried = jnp.where(m.hold.held, mean * (m.mass * (pushed - v) - h * f), 0.0)
+        shove = jnp.sum(carried)
+    return Spent(lost, zero if rubbed is None else rubbed, damping, h * jnp.sum(inner * mean), shove)
 
 
 def _touch(probe, patch, u, centre, grip):

@@ -1,0 +1,131 @@
+"""Cohesive faces in the simulation: the two sides of a split held together by a law, at points of the faces.
+
+Traction acts at 2 x 2 Gauss points of each quadrilateral (three of a triangle) over reference areas, never at nodes:
+nodal springs drive the hourglass modes of one-point elements. The opening is that of the two sides against each other;
+its normal is the present one of the surface midway. `seam.py` chooses stiffness and static mass.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from tissuejax.cohesion.engine import Memory, Vector, pull, stored, whole
+from tissuejax.cohesion.law import Law
+
+barrier = jax.lax.optimization_barrier
+
+
+class Faces(eqx.Module):
+    """Faces of a split body.
+
+    Attributes:
+        law: static; its parameters by name in `values`, each a number or one a face (P,).
+        minus, plus: nodes of either side.
+        area: reference area of each point, m^2 (q, P).
+        stiffness: of unbroken faces, Pa/m. contact: of closing gaps, Pa/m.
+        mass: static mass on the faces' nodes, kg (N,), so that they never limit the step.
+        along: unit vector by which the front is measured.
+        notch: 1 where a face has been parted before the start (a cut made earlier), else 0; None is whole.
+    """
+
+    law: Law = eqx.field(static=True)
+    values: Mapping[str, Array]
+    minus: Int[Array, "P v"]
+    plus: Int[Array, "P v"]
+    area: Float[Array, "q P"]
+    stiffness: Float[Array, ""]
+    contact: Float[Array, ""]
+    mass: Float[Array, " N"]
+    along: Float[Array, " 3"]
+    notch: Float[Array, " P"] | None = None
+
+
+class Seam(NamedTuple):
+    """Worked out once a run: reference corners (3, v, P) and places of the points along the front's direction."""
+
+    x: Float[Array, "3 v P"]
+    ahead: Float[Array, "q P"]
+
+
+class Held(NamedTuple):
+    """What the faces do in one step: forces (3, N), memory, and energy lost in the step, J."""
+
+    nodal: Float[Array, "3 N"]
+    memory: Memory
+    lost: Float[Array, ""]
+
+
+def quadrature(corners: int) -> tuple[np.ndarray, np.ndarray]:
+    """Shape functions (q, corners), weights (q,): 2 x 2 Gauss points over [-1, 1]^2; three inner ones (sum 1/2)."""
+    if corners == 4:
+        g = 1 / np.sqrt(3)
+        a, b = np.array([-g, g, g, -g]), np.array([-g, -g, g, g])
+        return np.stack([(1 - a) * (1 - b), (1 + a) * (1 - b), (1 + a) * (1 + b), (1 - a) * (1 + b)], -1) / 4, np.ones(
+            4
+        )
+    return np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6, np.full(3, 1 / 6)
+
+
+def seam(faces: Faces, points: Float[Array, "N 3"]) -> Seam:
+    """Reference places of the faces."""
+    x = points.T[:, faces.minus.T]
+    shape = jnp.asarray(quadrature(faces.minus.shape[1])[0], x.dtype)
+    return Seam(x, jnp.einsum("qv,ivp,i->qp", shape, x, faces.along.astype(x.dtype)))
+
+
+def unopened(faces: Faces) -> Memory:
+    """Memory at the start; notched faces carry nothing."""
+    memory = whole(faces.law, faces.values, faces.stiffness, faces.area)
+    return memory if faces.notch is None else memory._replace(secant=memory.secant * (1 - faces.notch))
+
+
+def gaps(faces: Faces, seam: Seam, u: Float[Array, "3 N"]) -> tuple[Vector, Vector]:
+    """Opening of the points (three arrays (q, P), m) and the normals midway (three arrays (P,))."""
+    low = u.at[:, faces.minus.T].get(mode="promise_in_bounds")
+    high = u.at[:, faces.plus.T].get(mode="promise_in_bounds")
+    shape = jnp.asarray(quadrature(faces.minus.shape[1])[0], u.dtype)[:, :, None]
+    jump, middle = barrier((high - low, seam.x + 0.5 * (high + low)))
+    gap = tuple(sum(shape[:, a] * d[a] for a in range(shape.shape[1])) for d in jump)
+    if shape.shape[1] == 4:
+        one, two = middle[:, 2] - middle[:, 0], middle[:, 3] - middle[:, 1]
+    else:
+        one, two = middle[:, 1] - middle[:, 0], middle[:, 2] - middle[:, 0]
+    normal = jnp.stack(
+        [one[1] * two[2] - one[2] * two[1], one[2] * two[0] - one[0] * two[2], one[0] * two[1] - one[1] * two[0]]
+    )
+    return tuple(barrier(gap)), tuple(barrier(normal / jnp.sqrt(jnp.sum(normal**2, 0))))
+
+
+def forces(faces: Faces, seam: Seam, u: Float[Array, "3 N"], memory: Memory) -> Held:
+    """Forces of the faces on the tissue at displacements u."""
+    gap, normal = gaps(faces, seam, u)
+    acting = pull(faces.law, faces.values, faces.stiffness, faces.contact, gap, normal, memory)
+    f = barrier(jnp.stack(acting.traction) * faces.area)
+    shape = jnp.asarray(quadrature(faces.minus.shape[1])[0], f.dtype)[:, :, None]
+    at = barrier(sum(shape[q] * f[:, q][:, None] for q in range(shape.shape[0])))
+    nodal = jnp.zeros_like(u).at[:, faces.plus.T].add(at, mode="promise_in_bounds")
+    nodal = nodal.at[:, faces.minus.T].add(-at, mode="promise_in_bounds")
+    return Held(nodal, acting.memory, jnp.sum(acting.lost * faces.area))
+
+
+class Cracked(NamedTuple):
+    """Energy stored in the faces (J), area parted so far (m^2), and the farthest parted point along `along` (m)."""
+
+    stored: Float[Array, ""]
+    area: Float[Array, ""]
+    front: Float[Array, ""]
+
+
+def cracked(faces: Faces, seam: Seam, u: Float[Array, "3 N"], memory: Memory) -> Cracked:
+    """How far the crack has come. Parted: opened as far as the law's end, or notched before; -inf where nothing is."""
+    gap, normal = gaps(faces, seam, u)
+    energy = jnp.sum(faces.area * stored(memory.secant, faces.contact, gap, normal))
+    parted = memory.reached >= faces.law.end(faces.values, faces.stiffness)
+    ahead = parted if faces.notch is None else parted | (faces.notch > 0)
+    front = jnp.max(jnp.where(ahead, seam.ahead, -jnp.inf))
+    return Cracked(energy, jnp.sum(faces.area * parted), front)
