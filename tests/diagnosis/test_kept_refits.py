@@ -83,7 +83,7 @@ def test_what_was_kept_counts_only_for_the_same_question(tmp_path, monkeypatch):
         monkeypatch.setattr(bench, "told", lambda: told)
         if change:
             change(bench)
-        misfit = white(bench) if noise is None else Misfit(bench, {"force": noise})
+        misfit = white(bench) if noise is None else Misfit(bench, {(r, "force"): noise for r in ("r1", "r2")})
         kept = KeptRefits(bench, tmp_path)
         kept.refit(misfit, (), start or {}, **options)
         return kept.found

@@ -12,6 +12,8 @@ All in whitened residuals, with the rest of the fit as it stands. Exponents of f
 limit describe no law: the recordings then ask for something that is not there below some stretch.
 """
 
+from functools import partial
+
 import numpy as np
 from jaxtyping import Float
 
@@ -59,7 +61,7 @@ def periodic(bench: Bench, misfit: Misfit, r: Refit) -> tuple[str, ...]:
         if frequency * time[-1] < CYCLES:
             brief.append(s.recording)
             continue
-        white = misfit.noises[s.channel].whiten
+        white = partial(misfit.white, s=s)
         scale = bench.sigma[s.rows]
         e, p = white((left + part)[s.rows] / scale), white(part[s.rows] / scale)
         gain = float(e @ e - (e - p) @ (e - p))

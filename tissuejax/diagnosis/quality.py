@@ -8,8 +8,8 @@ import numpy as np
 
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.misfit import Misfit
-from tissuejax.diagnosis.noise import portmanteau
 from tissuejax.diagnosis.refit import Refit
+from tissuejax.estimation.whiteness import portmanteau
 
 SIGNIFICANT = 3.5  # standard deviations
 # Chi-square per sample below which the stated noise is no noise but a bound on it (the spread between specimens, say):

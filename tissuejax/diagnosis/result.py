@@ -64,7 +64,14 @@ class Diagnosis:
             "base_parameters": self.base(),
             "numerical_error": self.numerical(s.empty),
             "numerical_error_after": self.numerical(v.chosen),
-            "noise": {c: {"correlated_share": n.share, "correlation": n.rho} for c, n in s.misfit.noises.items()},
+            "noise": {
+                f"{r}/{c}": {
+                    "correlated_share": n.share,
+                    "correlation_time": n.tau,
+                    "over_recorded": s.misfit.levels.get((r, c)),
+                }
+                for (r, c), n in s.misfit.noises.items()
+            },
             "explained": {"fitted": v.explained[0], "held_out": v.explained[1] if bench.held_out else None},
             "fitted": list(bench.fitted),
             "held_out": list(bench.held_out),

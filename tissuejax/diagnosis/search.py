@@ -365,11 +365,7 @@ def promising(s: Search, most: int) -> list[frozenset]:
 def renew_noise(s: Search) -> None:
     """Estimate the noise again from the best fit so far; if it has changed, refit everything under it."""
     now = estimated(s.bench, s.best.prediction)
-    changed = any(
-        abs(now.noises[c].share - n.share) > 0.1 or abs(now.noises[c].rho - n.rho) > 0.05
-        for c, n in s.misfit.noises.items()
-    )
-    if changed:
+    if now.differs(s.misfit):
         s.misfit = now
         s.scored.clear()
         for keys in list(s.refits):

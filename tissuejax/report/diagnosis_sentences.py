@@ -3,6 +3,8 @@
 import inspect
 import math
 
+from tissuejax.diagnosis.bench import Segment
+from tissuejax.diagnosis.misfit import Misfit
 from tissuejax.diagnosis.quality import SIGNIFICANT
 from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.result import Diagnosis
@@ -91,13 +93,26 @@ def sure(d: Diagnosis) -> list[str]:
     if math.isfinite(v.confidence) and v.kind in ("found", "ambiguous"):
         stated = f"{v.confidence:.0%}" if v.confidence < 0.995 else "over 99 %"
         out.append(f"Stated confidence that exactly this set is right: {stated}.")
-    for channel, n in s.misfit.noises.items():
-        if n.share > 0.05:
-            out.append(
-                f"The noise of {channel.replace('_', ' ')} is serially correlated (share {n.share:.2f}, {n.rho:.2f} "
-                f"from sample to sample): {n.inflation:.0f} samples count as one for smooth signals, and all tests "
-                "allow for it."
-            )
+    return out + correlated_noise(s.misfit)
+
+
+def correlated_noise(misfit: Misfit) -> list[str]:
+    """What is said of noise that remembers, once for the recordings that share it."""
+    alike: dict[tuple, list[Segment]] = {}
+    for segment in misfit.rows(misfit.bench.fitted):
+        noise = misfit.noise(segment)
+        if noise.share > 0.05 and not noise.is_white(segment.time):
+            alike.setdefault((segment.channel, noise), []).append(segment)
+    out = []
+    for (channel, noise), segments in alike.items():
+        per = sum(len(s.time) for s in segments) / sum(noise.effective(s.time) for s in segments)
+        names = list(dict.fromkeys(s.recording for s in segments))
+        where = "" if set(names) == set(misfit.bench.fitted) else f" in {joined(names)}"
+        out.append(
+            f"The noise of {channel.replace('_', ' ')}{where} is correlated over {noise.tau:.2g} s "
+            f"({noise.share:.0%} of its variance): {per:.0f} samples count as one for smooth signals, and all tests "
+            "allow for it."
+        )
     return out
 
 

@@ -1,0 +1,248 @@
+"""How the noise is correlated in time, estimated although the prediction is wrong.
+
+A residual that is smooth because physics is missing must not be taken for correlated noise, or nothing would ever be
+found. Two facts keep them apart: the variance of a single sample was recorded, and noise with a correlated part can't
+have more; and a mismatch driven by piecewise-smooth motions has a spectrum that falls at least as f^-4 (kinks), while
+that of exponentially correlated noise never falls faster than f^-2. So a residual is taken for the sum of
+
+    white noise + exponentially correlated noise + an integrated random walk with an intensity of its own,
+
+whose likelihood is exact at any sampling: a Kalman filter with four numbers' worth of state. The integrated random
+walk (spectrum exactly f^-4; its posterior mean is a cubic smoothing spline) is the nuisance, one a recording, with a
+level and a slope that nothing is known of.
+
+The shape (share, tau) is common to the recordings unless their likelihoods say otherwise. The level is the recorded
+one, unless they say that it is wrong: then it is each recording's own.
+
+Sources: Wahba 1978, J. R. Stat. Soc. B 40:364 (spline and integrated random walk); Harvey 1989, Forecasting,
+Structural Time Series Models and the Kalman Filter, ch. 3; Akaike 1974; Schwarz 1978.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from tissuejax.cache.programs import Kept
+from tissuejax.estimation.noise import Noise
+
+LEAST = 64  # samples of a series from which its correlation can be told from a mismatch
+GAIN = 8.0  # twice the log-likelihood by which correlated noise must beat white: 2 Akaike units a parameter beyond cost
+SHARES, TAUS, WALKS = 6, 7, 9  # tried at once of the share, the time, the intensity of the walk
+TRIALS = SHARES * TAUS * WALKS  # one compiled program for them
+ROUNDS = 3  # of trials, each in a narrower range
+DIFFUSE = 1e4  # prior variance of the mismatch's level over that of the residual
+NEVER_WHITE = 1e-3  # least share of white noise that is tried
+
+
+@dataclass(frozen=True)
+class Series:
+    """A residual of one recording over its recorded standard deviation, columns sampled alike.
+
+    Attributes:
+        time: s.
+        values: one row a sample.
+    """
+
+    time: Float[np.ndarray, " n"]
+    values: Float[np.ndarray, "n k"]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What is said of the noise of several recordings.
+
+    Attributes:
+        noises: the shape for each series, of standard deviation 1.
+        levels: standard deviation of each over the recorded one, mismatch left aside.
+        common: whether all series share one shape.
+    """
+
+    noises: tuple[Noise, ...]
+    levels: tuple[float, ...]
+    common: bool = True
+
+
+def estimate(series: Sequence[Series]) -> Estimate:
+    """Correlation of the noise in several residuals.
+
+    Returns:
+        White noise where nothing else is clearly better; short series (< `LEAST` samples) take the shape of the others
+        and are white where there are none.
+    """
+    long = [i for i, s in enumerate(series) if len(s.time) >= LEAST]
+    levels = [float(np.std(s.values)) or 1.0 if len(s.time) else 1.0 for s in series]
+    if not long:
+        return Estimate((Noise(),) * len(series), tuple(levels))
+    surfaces = [_Surface(series[i]) for i in long]
+    shared = _best(surfaces)
+    price = 2 * (len(surfaces) - 1) * math.log(sum(s.n for s in surfaces))
+    common = 2 * shared.apart < 0.5 * price  # on a coarse grid; the rest is seen where it may matter
+    alone = [_best([s]) for s in surfaces] if not common else [shared] * len(surfaces)
+    common = common or 2 * (sum(a.likelihood for a in alone) - shared.likelihood) <= price
+    noises = [Noise.shaped(shared.share, shared.tau)] * len(series)
+    for i, own, level in zip(long, alone, shared.levels):
+        levels[i] = level if common else own.levels[0]
+        if not common:
+            noises[i] = Noise.shaped(own.share, own.tau)
+    return Estimate(tuple(noises), tuple(levels), common)
+
+
+class _Surface:
+    """The likelihood of one series, the walk's intensity and the level at their best."""
+
+    def __init__(self, series: Series):
+        time = np.asarray(series.time, float) - series.time[0]
+        self.n, self.columns = len(time), series.values.reshape(len(time), -1).T
+        self.span, self.step = time[-1], float(np.median(np.diff(time)))
+        line = np.stack([np.ones(self.n), time / self.span - 0.5], 1)
+        self.columns = self.columns - (line @ np.linalg.lstsq(line, self.columns.T, rcond=None)[0]).T
+        size = float(np.mean(self.columns**2)) or 1.0
+        self.prior = np.float64(DIFFUSE * max(size, 1.0)), np.float64(self.span)
+        self.least, self.most = math.log10(1e-6 / self.span**3), math.log10(1e3 / self.step**3)
+        power = 2 ** math.ceil(math.log2(max(self.n, 256)))
+        padded = 3 * power // 4 if self.n <= 3 * power // 4 else power  # few lengths, few programs
+        self.steps = np.pad(np.diff(time), (0, padded - self.n + 1))
+        self.seen = np.arange(padded) < self.n
+        self.padded = [np.pad(c, (0, padded - self.n)) for c in self.columns]
+
+    @staticmethod
+    def walks(low: float, high: float, n: int) -> np.ndarray:
+        """No walk, and n - 1 intensities between two powers of ten."""
+        return np.concatenate([[0.0], np.logspace(low, high, n - 1)])
+
+    def __call__(
+        self, shares: np.ndarray, taus: np.ndarray, walks: np.ndarray, free: bool
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Log-likelihood, intensity of the walk and variance at their best, for every share and time.
+
+        Args:
+            walks: intensities to try, 1/s^3, over the noise's variance.
+            free: whether the variance may differ from the recorded one.
+        """
+        trials = [x.ravel() for x in np.meshgrid(shares, taus, walks, indexing="ij")]
+        with jax.enable_x64(True):
+            parts = [_filtered(self.steps, c, self.seen, *trials, *self.prior) for c in self.padded]
+        logs, squares = (np.sum([np.asarray(part[i]) for part in parts], axis=0) for i in (0, 1))
+        n = self.n * len(parts)
+        # white noise may exceed what was recorded, nothing else is like it; correlated noise may not
+        variance = np.clip(squares / n, 1e-300, np.where(trials[0] > 0, 1.0, np.inf)) if free else np.ones(len(logs))
+        likelihood = -0.5 * (n * np.log(variance) + logs + squares / variance)
+        shape = (len(shares), len(taus), len(walks))
+        likelihood, variance = likelihood.reshape(shape), variance.reshape(shape)
+        at = np.argmax(likelihood, axis=2)[..., None]
+        best, level = (np.take_along_axis(x, at, 2)[..., 0] for x in (likelihood, variance))
+        return best, np.asarray(walks)[at[..., 0]], level
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A shape; `apart` is by how much the log-likelihood may grow if every series has a shape of its own."""
+
+    share: float
+    tau: float
+    likelihood: float
+    levels: list[float]
+    apart: float = 0.0
+
+
+def _best(surfaces: Sequence[_Surface]) -> _Found:
+    """White noise or, if that is clearly better, correlated; of the recorded level unless that is clearly wrong.
+
+    Whether it is correlated is asked with the level free: a level that is a little off must not be read as a shape.
+    """
+    told = [s(np.zeros(1), np.ones(1), s.walks(s.least, s.most, TRIALS), True) for s in surfaces]
+    white = _Found(0.0, 1.0, sum(float(t[0][0, 0]) for t in told), [math.sqrt(t[2][0, 0]) for t in told])
+    found = _correlated(surfaces, [float(t[0][0, 0]) for t in told], True)
+    if 2 * (found.likelihood - white.likelihood) <= GAIN:
+        return replace(white, apart=found.apart)
+    recorded = _correlated(surfaces, [-math.inf] * len(surfaces), False, near=found)
+    if 2 * (found.likelihood - recorded.likelihood) > GAIN * len(surfaces):
+        return found
+    return replace(recorded, apart=found.apart)
+
+
+def _correlated(surfaces: Sequence[_Surface], white: Sequence[float], free: bool, near: _Found | None = None) -> _Found:
+    """The share and the time of highest likelihood, on ever narrower grids.
+
+    Args:
+        white: likelihoods without a share.
+        near: where to begin, two rounds instead of three.
+    """
+    logits, taus = np.linspace(-4.5, 6.5, SHARES), np.array([s.step for s in surfaces])
+    logs = np.linspace(math.log(min(taus) / 3), math.log(max(s.span for s in surfaces) / 3), TAUS)
+    if near is not None:
+        at = math.log(near.share / (1 - near.share))
+        logits = np.linspace(at - 2, at + 2, SHARES)
+        logs = math.log(near.tau) + np.linspace(-1.2, 1.2, TAUS)
+    ranges = [(s.least, s.most) for s in surfaces]
+    best, apart = _Found(0.0, 1.0, -math.inf, []), None
+    for _ in range(ROUNDS if near is None else ROUNDS - 1):
+        shares = np.minimum(1 / (1 + np.exp(-logits)), 1 - NEVER_WHITE)
+        told = [s(shares, np.exp(logs), s.walks(*r, WALKS), free) for s, r in zip(surfaces, ranges)]
+        total = sum(t[0] for t in told)
+        i, j = np.unravel_index(np.argmax(total), total.shape)
+        if apart is None:
+            own = sum(max(float(np.max(t[0])), w) for t, w in zip(told, white))
+            apart = own - max(float(total[i, j]), sum(white))
+        if total[i, j] > best.likelihood:
+            levels = [math.sqrt(t[2][i, j]) for t in told]
+            best = _Found(float(shares[i]), float(math.exp(logs[j])), float(total[i, j]), levels, apart)
+        ranges = [_narrowed(r, float(t[1][i, j])) for r, t in zip(ranges, told)]
+        logits = _around(logits, i)
+        logs = _around(logs, j)
+    return best
+
+
+def _around(grid: np.ndarray, at: int) -> np.ndarray:
+    """As many values between the neighbours of the best one."""
+    step = grid[1] - grid[0]
+    return np.linspace(grid[at] - step, grid[at] + step, len(grid))
+
+
+def _narrowed(limits: tuple[float, float], best: float) -> tuple[float, float]:
+    """Powers of ten between which the walk is sought next."""
+    step = 1.5 * (limits[1] - limits[0]) / (WALKS - 2)
+    at = math.log10(best) if best > 0 else limits[0]
+    return at - step, at + step
+
+
+def _filter(steps, y, seen, share, tau, walk, diffuse, span):
+    """Sum of the logarithms of the innovations' variances and of their squares over these, for every trial.
+
+    State: correlated noise u, level a and slope b of the mismatch; y = u + a + white. Variances are in units of the
+    noise's.
+    """
+    white = 1 - share
+    none = jnp.zeros_like(share)
+
+    def advance(carry, now):
+        (u, a, b), (uu, ua, ub, aa, ab, bb), logs, squares = carry
+        dt, value, there = now
+        hu, ha, hb = uu + ua, ua + aa, ub + ab
+        variance = hu + ha + white
+        error = jnp.where(there, value - u - a, 0.0)
+        gain = jnp.where(there, 1 / variance, 0.0)
+        logs = logs + jnp.where(there, jnp.log(variance), 0.0)
+        squares = squares + gain * error**2
+        ku, ka, kb = gain * hu, gain * ha, gain * hb
+        u, a, b = u + ku * error, a + ka * error, b + kb * error
+        uu, ua, ub = uu - ku * hu, ua - ku * ha, ub - ku * hb
+        aa, ab, bb = aa - ka * ha, ab - ka * hb, bb - kb * hb
+        fade = jnp.exp(-dt / tau)
+        ua, ub = fade * (ua + dt * ub), fade * ub
+        uu = fade**2 * uu + share * (1 - fade**2)
+        aa = aa + 2 * dt * ab + dt**2 * bb + walk * dt**3 / 3
+        ab = ab + dt * bb + walk * dt**2 / 2
+        bb = bb + walk * dt
+        return ((fade * u, a + dt * b, b), (uu, ua, ub, aa, ab, bb), logs, squares), None
+
+    first = ((none, none, none), (share, none, none, none + diffuse, none, none + diffuse / span**2), none, none)
+    return jax.lax.scan(advance, first, (steps, y, seen))[0][2:]
+
+
+_filtered = Kept(_filter, "estimation.correlation._filter")
