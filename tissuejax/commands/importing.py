@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import shlex
 from pathlib import Path
 from typing import ClassVar
 
@@ -101,12 +102,13 @@ def _guessed(given: argparse.Namespace) -> Reply:
 
 
 def _said(guess: Guess, side: Path, given: argparse.Namespace) -> Reply:
+    told, table = shlex.quote(str(side)), shlex.quote(str(guess.path))
     lines = [f"{guess.path}: {guess.machine or 'a table'}", *(f"  assumed: {s}" for s in guess.said)]
     record = {"side_file": str(side), "assumed": list(guess.said), "lacking": list(guess.lacking), "remarks": []}
     if guess.lacking:
         options = " ".join(f"--{name} ..." for name in guess.lacking)
         lines += ["", f"wrote {side}, which still needs: {', '.join(guess.lacking)}. Write them into the lines marked"]
-        lines.append(f"FILL IN, or give them now: tissuejax import {guess.path} {options} --force")
+        lines.append(f"FILL IN, or give them now: tissuejax import {table} {options} --force")
         return Reply(record, "\n".join(lines), 2)
     for name in names(side):
         sample = read(side, name)
@@ -122,7 +124,7 @@ def _said(guess: Guess, side: Path, given: argparse.Namespace) -> Reply:
     if given.out is not None and given.out.suffix in (".h5", ".hdf5"):
         record |= _written(str(side), given.out, given.force)
         lines.append(f"wrote {given.out}")
-    lines += [f"look   tissuejax inspect {side} --out look", f"fit    tissuejax fit {side} --energy neo-hookean"]
+    lines += [f"look   tissuejax inspect {told} --out look", f"fit    tissuejax fit {told} --energy neo-hookean"]
     return Reply(record, "\n".join(lines))
 
 

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,7 +49,19 @@ def understood(
         meanings: bare names that the format knows; "" says that a column is of no use.
         shear: whether the test is known to be a shear test.
     """
-    return [_one(name, unit, numbers[name], meanings, shear) for name, unit in units.items() if name in numbers]
+    found = [_one(name, unit, numbers[name], meanings, shear) for name, unit in units.items() if name in numbers]
+    return [_ratio(g, found, numbers) if g.quantity == "strain" and g.assumed else g for g in found]
+
+
+def _ratio(strain: Guessed, found: Sequence[Guessed], numbers: Mapping[str, np.ndarray]) -> Guessed:
+    """A strain taken as percent is a ratio after all if a column of true strain says ln(1 + strain)."""
+    for other in found:
+        if other.quantity == "true_strain":
+            e, true = numbers[strain.column], numbers[other.column]
+            with np.errstate(invalid="ignore"):
+                if np.nanmax(np.abs(np.log1p(e) - true)) < 0.01 * np.nanmax(np.abs(true)):
+                    return replace(strain, unit="1", assumed="")
+    return strain
 
 
 def _one(name: str, unit: str, values: np.ndarray, meanings: Mapping[str, str], shear: bool) -> Guessed:

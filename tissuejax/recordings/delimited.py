@@ -151,4 +151,4 @@ def _split(text: str, mark: str) -> list[str]:
         return re.split(r"\s+", text.strip())
     if '"' not in text:
         return [cell.strip() for cell in text.split(mark)]
-    return [cell.strip() for cell in next(csv.reader([text], delimiter=mark))]
+    return [cell.strip() for cell in next(csv.reader([text], delimiter=mark, skipinitialspace=True))]

@@ -11,8 +11,9 @@ from tissuejax.errors import InputError
 from tissuejax.recordings.columns_guessed import Guessed, backwards, chosen_pairs, chosen_time, understood
 from tissuejax.recordings.delimited import Columns, text_lines
 from tissuejax.recordings.exports import text
-from tissuejax.recordings.exports.export import BLOCK, Exported, TableExport, recognised, stacked
+from tissuejax.recordings.exports.export import BLOCK, Exported, TableExport, export_named, recognised, stacked
 from tissuejax.recordings.exports.meanings import bare, readable, size_of, split_unit
+from tissuejax.recordings.exports.tracked import marker_export
 from tissuejax.recordings.side_file import KINEMATIC, SPECIMEN
 from tissuejax.units import quantity
 
@@ -153,11 +154,15 @@ def guessed(
 
 def _content(path: Path, format: str) -> tuple[TableExport | None, Exported, dict[str, object], list[str]]:
     """The reader (None for a plain table), the content, how a plain table is read, and what was assumed."""
-    from tissuejax.recordings.exports.export import export_named
-
+    if (points := marker_export(path)) is not None:
+        raise InputError(
+            f"{path}: a file of points by {points.program}: use it as markers of a probing, see "
+            "`tissuejax import --template probe`"
+        )
     kind = export_named(format) if format else recognised(path)
     if kind is not None:
-        basis = f" (the reader was written from {kind.basis})" if "description" in kind.basis else ""
+        public = kind.basis.startswith("its public")
+        basis = " (no real file was at hand: the reader follows its public description)" if public else ""
         return kind, kind.read(path), {}, [f"it is an export of {kind.machine}{basis}"] if kind.name != "text" else []
     lines = text_lines(path)
     whole = text.understood(lines)

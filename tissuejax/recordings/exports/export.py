@@ -2,6 +2,8 @@
 
 import abc
 import functools
+import gzip
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -87,9 +89,21 @@ def export_named(name: str) -> TableExport:
 
 def recognised(path: Path) -> TableExport | None:
     """The export that a file is, by its content; None where no member knows it."""
-    with open(path, "rb") as file:
-        head = decoded(file.read(8192))
+    head = head_of(path)
     return next((kind for kind in table_exports().values() if kind.recognises(path, head)), None)
+
+
+def head_of(path: Path) -> str:
+    """The first 8192 bytes of a file as text, unpacked where it is gzip."""
+    with open(path, "rb") as file:
+        content = file.read(8192)
+    if content[:2] == b"\x1f\x8b":
+        try:
+            with gzip.open(path) as file:
+                content = file.read(8192)
+        except (OSError, EOFError, zlib.error):  # said by whoever reads the whole
+            return ""
+    return decoded(content)
 
 
 def decoded(content: bytes) -> str:
