@@ -35,8 +35,7 @@ def write_material(case: Case, path: Path) -> None:
             group["time"] = trial.time
             group["shear" if trial.kind == "simple-shear" else "stretch"] = trial.drive
             group["nominal_stress"] = case.stress[trial.name]
-            if case.noise is not None:
-                group["nominal_stress"].attrs["noise_std"] = case.noise
+            group["nominal_stress"].attrs["noise_std"] = case.noise or 0.0  # nothing stated is written as zero
             group["direction"] = np.asarray(trial.direction, float)
 
 
