@@ -156,6 +156,22 @@ def test_an_answer_beside_a_rest(truth, answer, right):
     assert mark_rest("s", key(truth, ["hysteresis"]), answer).right is right
 
 
+@pytest.mark.parametrize(
+    ("truth", "answer", "apt"),
+    [
+        (("slack",), said("ambiguous", alternatives=[{"effects": ["slack"]}]), True),
+        (("slack",), said("ambiguous", alternatives=[{"effects": ["drift"]}]), False),
+        ((), said("ambiguous", alternatives=[{"effects": ["drift"]}]), False),
+        (("slack", "drift"), said("found-in-part", "slack"), True),  # says itself that there is more
+        (("slack", "drift"), said("found", "slack"), False),
+        (("slack",), said("unexplained"), False),
+        ((), said("unexplained"), True),
+    ],
+)
+def test_what_confidence_is_about(truth, answer, apt):
+    assert mark_rest("s", key(truth), answer).apt is apt
+
+
 def test_size_of_the_rest_and_what_was_tried():
     assert true_size(key(())) == pytest.approx(10.0)
     m = mark_rest("s", key(("slack",)), said("found", "slack", rest={"rms": 15.0}, sets=[{"effects": ["slack/sharp"]}]))

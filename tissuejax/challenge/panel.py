@@ -50,6 +50,7 @@ class Answer:
         whole: all groups were.
         wrong: names that the protocol does not allow.
         right: for a cause: met and nothing wrong; for a null: no wrong physical name.
+        apt: whether the answer as such is true ("ambiguous": the cause is among those offered); confidence is about it.
         confidence: as stated, or nan.
         seconds: of the diagnosis.
     """
@@ -62,6 +63,7 @@ class Answer:
     whole: bool
     wrong: tuple[str, ...]
     right: bool
+    apt: bool
     confidence: float
     seconds: float
 
@@ -117,6 +119,9 @@ def answered(cause: Cause, result: Mapping, words: Mapping[str, str] | None = No
     wrong = tuple(n for n in named if n not in allowed)
     groups = [bool(g & set(named)) for g in cause.expected]
     stated = result.get("confidence")
+    right = verdict != "failed" and not wrong and (cause.null or groups[0])
+    offered = set(named) | set(own(result.get("alternatives"))) | set(own(result.get("best_attempt")))
+    apt = right or (verdict == "ambiguous" and not cause.null and bool(cause.expected[0] & offered))
     return Answer(
         cause=cause,
         verdict=verdict,
@@ -125,7 +130,8 @@ def answered(cause: Cause, result: Mapping, words: Mapping[str, str] | None = No
         met=bool(groups) and groups[0],
         whole=bool(groups) and all(groups),
         wrong=wrong,
-        right=verdict != "failed" and not wrong and (cause.null or groups[0]),
+        right=right,
+        apt=apt and not (cause.null and verdict == "ambiguous"),
         confidence=float(stated) if isinstance(stated, int | float) else math.nan,
         seconds=float(result.get("seconds", math.nan)),
     )
@@ -194,13 +200,8 @@ def calibration(answers: Sequence[Answer]) -> dict:
         here = [a for a in stated if low <= a.confidence < high or (high == 1 and a.confidence == 1)]
         if here:
             mean = float(np.mean([a.confidence for a in here]))
-            row = rate(here, _acceptable)
+            row = rate(here, lambda a: a.apt)
             error += len(here) / len(stated) * abs(mean - row["share"])
             rows.append({"from": low, "to": high, "stated": mean} | row)
-    brier = float(np.mean([(a.confidence - _acceptable(a)) ** 2 for a in stated])) if stated else None
+    brier = float(np.mean([(a.confidence - a.apt) ** 2 for a in stated])) if stated else None
     return {"bins": rows, "expected_calibration_error": error if stated else None, "brier": brier, "of": len(stated)}
-
-
-def _acceptable(a: Answer) -> bool:
-    """Whether the answer as a whole is right: a null's is right only if it names no physical effect."""
-    return a.right

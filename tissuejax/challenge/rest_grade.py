@@ -81,7 +81,7 @@ def summary(marks: list[RestMark]) -> dict:
         here = [m for m in stated if low <= m.confidence < high or (high == 1 and m.confidence == 1)]
         if here:
             mean = float(np.mean([m.confidence for m in here]))
-            bins.append({"from": low, "to": high, "stated": mean} | rate(here, lambda m: m.right))
+            bins.append({"from": low, "to": high, "stated": mean} | rate(here, lambda m: m.apt))
     error = sum(b["of"] * abs(b["stated"] - b["share"]) for b in bins) / len(stated) if stated else None
     return {
         "rates": rates,

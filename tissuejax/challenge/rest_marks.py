@@ -24,6 +24,8 @@ class RestMark:
         best: names of the best attempt, given or not.
         wrong: names neither of an effect in it nor true of a law of its rest.
         right: all effects named and no wrong name; on a rest alone no wrong physical name.
+        apt: whether the answer as such is true: for "ambiguous" the truth is among those offered, for "unexplained" and
+            "nothing-missing" no effect of the catalogue acts, for a name given it is true; what confidence is about.
         tried: whether a set with exactly these effects was fitted; None where the result doesn't list its sets.
         rest_over_true: stated size of the rest over the true one, rms; nan where none is stated.
         where: (right, false, missed) places, recordings and phases together.
@@ -43,6 +45,7 @@ class RestMark:
     best: tuple[str, ...]
     wrong: tuple[str, ...]
     right: bool
+    apt: bool
     tried: bool | None
     rest_over_true: float
     where: tuple[int, int, int]
@@ -81,6 +84,13 @@ def mark_rest(name: str, key: dict, result: dict, seconds: float = math.nan, kep
     recordings, phases = stated(result.get("located") or ())
     a, b = agreement(key["where"]["recordings"], recordings), agreement(key["where"]["phases"], phases)
     confidence = result.get("confidence")
+    offered = set(named) | set(names_in(result.get("alternatives"))) | set(best)
+    if verdict == "ambiguous":
+        apt = bool(truth) and set(truth) <= offered
+    elif verdict in SETTLED:
+        apt = bool(named) and not wrong and (verdict != "found" or set(truth) <= set(named))
+    else:
+        apt = not truth and verdict != "failed"
     return RestMark(
         name=name,
         category=key["category"],
@@ -93,6 +103,7 @@ def mark_rest(name: str, key: dict, result: dict, seconds: float = math.nan, kep
         best=best,
         wrong=wrong,
         right=verdict != "failed" and not wrong and set(truth) <= set(named),
+        apt=apt,
         tried=tried,
         rest_over_true=rest_size(result) / true_size(key),
         where=(a[0] + b[0], a[1] + b[1], a[2] + b[2]),
