@@ -46,7 +46,7 @@ def form(name: str | None) -> Form:
     return FORMS[name]
 
 
-def convert(values: Mapping[str, float], source: str, target: str) -> dict[str, float]:
+def convert(values: Mapping[str, float], source: str | None, target: str | None) -> dict[str, float]:
     """Ogden constants `mu1, alpha1, mu2, ...` given in form `source`, in form `target`: the same energy.
 
     Args:
