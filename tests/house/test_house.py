@@ -1,16 +1,19 @@
 """The properties of the house: floors, file lengths, discovery, docstrings, and a README whose code runs."""
 
 import ast
+import hashlib
 import importlib
 import inspect
 import pkgutil
 import re
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest
 
 import tissuejax
+from tests.conftest import outside
 
 ROOT = Path(tissuejax.__file__).parent
 PROJECT = ROOT.parent
@@ -142,6 +145,17 @@ def pages() -> list[Path]:
     folders = [PROJECT, *(PROJECT / f for f in ("docs", "fits", "tests", "data", "notebooks"))]
     deep = [p for folder in folders[1:] for p in folder.rglob("*.md")]
     return sorted([*PROJECT.glob("*.md"), *deep])
+
+
+def test_recordings_of_the_studies_are_those_of_the_manifest():
+    manifest = tomllib.loads((PROJECT / "fits" / "recordings.toml").read_text())
+    for name, entry in manifest.items():
+        folder = outside("recordings", name)
+        files = sorted(p for p in folder.rglob("*") if p.is_file() and p.name != "README.md")
+        own = {str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
+        if "*" in entry["sha256"]:
+            own = {"*": hashlib.sha256("".join(f"{k} {v}\n" for k, v in own.items()).encode()).hexdigest()}
+        assert own == entry["sha256"], f"{name}: other tables than those the figures were made from"
 
 
 def test_links_of_the_pages_lead_somewhere():

@@ -14,7 +14,7 @@ from tissuejax.parameters import Parameter
 class ExpOgden(Energy):
     """psi = C1 (exp(C2 (sum_i lbar_i^alpha - 3)) - 1).
 
-    Shear modulus at rest C1 C2 alpha^2 / 2. The source prints no "- 3"; its numbers need it (see source-facts).
+    Shear modulus at rest C1 C2 alpha^2 / 2. The source prints no "- 3"; its numbers need it.
     Source: Lister 2012, table 2.1.
     """
 

@@ -1,7 +1,7 @@
 """Ogden in principal stretches, any order, in a named form: its constants mean nothing without one.
 
 Four ways of writing the factor of sum_i lbar_i^alpha - 3 are in use; the same digits give moduli up to tenfold apart.
-The source prints two and means a third (see source-facts), so there is no default here.
+The source prints two and means a third (docs/conventions.md), so there is no default here.
 """
 
 from collections.abc import Callable, Mapping

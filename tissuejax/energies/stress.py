@@ -1,8 +1,8 @@
 """Stresses and the tangent, all derivatives of the energy and nothing else.
 
-With S = 2 dPsi/dC (source eq. 4.25 prints it without the factor 2; see source-facts) and Psi = psi_iso + U(J) follow
-P = F S, sigma = F S F^T / J and the material tangent dS/dE = 4 d2Psi/dCdC. Everything works component by component on
-`Sym`, so a trailing element axis is vectorised by XLA, and differentiates further (jvp of grad, vjp of grad, vmap).
+With S = 2 dPsi/dC (source eq. 4.25 prints it without the factor 2, its appendix A with it) and Psi = psi_iso + U(J)
+follow P = F S, sigma = F S F^T / J and the material tangent dS/dE = 4 d2Psi/dCdC. All works component by component
+on `Sym`, so a trailing element axis is vectorised by XLA, and differentiates further (jvp of grad, vjp of grad, vmap).
 """
 
 from collections.abc import Callable, Mapping

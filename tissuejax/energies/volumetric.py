@@ -1,6 +1,6 @@
 """Volumetric energies U(J), named by their form; all are zero with zero slope at J = 1.
 
-The forms met in the field (source-facts): K/2 (J-1)^2, K/2 ln(J)^2 and ABAQUS's sum_i (J-1)^(2i) / D_i.
+The forms met in the field: K/2 (J-1)^2, K/2 ln(J)^2 and ABAQUS's sum_i (J-1)^(2i) / D_i.
 """
 
 import abc
