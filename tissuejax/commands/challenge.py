@@ -76,8 +76,7 @@ says what simpler ways of answering would have said on the same cases.
             found = compare(given.folder, given.out, progress=for_terminal())
             return Reply(found, (given.out or given.folder).joinpath("rivals.csv").read_text())
         found = grade(given.folder, given.out)
-        if found["kind"] != "rest":
-            figures(found, given.out or given.folder)
+        figures(found, given.out or given.folder)
         lines = [f"{found['answered']} of {found['cases']} cases answered", ""]
         for name, r in found["rates"].items():
             if r["of"]:

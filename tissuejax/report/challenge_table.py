@@ -21,6 +21,10 @@ def figures(graded: dict, out: str | os.PathLike) -> dict[str, Path]:
     """
     out = Path(out)
     drawn = {}
+    if "by_ratio" in graded:
+        drawn["by_ratio"] = write_figure(out / "by_ratio.png", ratio_figure(graded["by_ratio"]), dpi=100)
+        bins = graded["calibration"]["bins"]
+        return drawn | {"calibration": write_figure(out / "calibration.png", calibration_figure(bins), dpi=100)}
     if graded["confusion"]:
         drawn["confusion"] = write_figure(out / "confusion.png", confusion_figure(graded["confusion"]), dpi=100)
     return drawn | {
@@ -82,6 +86,27 @@ def size_figure(by_size: list[dict]) -> Figure:
     ax.set_ylabel("share of cases")
     if ax.get_legend_handles_labels()[0]:  # a challenge may hold no case of any of these
         ax.legend(fontsize=8, frameon=False)
+    return figure
+
+
+def ratio_figure(by_ratio: list[dict]) -> Figure:
+    """Rates with 95 % intervals against the rest's share of the effect, a curve for each category."""
+    words = {"one": "one effect named", "two": "both of two named", "rest": "rest alone: no physical name"}
+    figure = Figure(figsize=(6, 3.4), layout="constrained", facecolor=PAPER)
+    ax = figure.subplots()
+    tidy(ax)
+    for k, category in enumerate(dict.fromkeys(r["category"] for r in by_ratio)):
+        rows = [r for r in by_ratio if r["category"] == category]
+        x = np.array([(r["from"] + r["to"]) / 2 + 0.006 * (k - 1) for r in rows])
+        y, low, high = (np.array([r[name] for r in rows]) for name in ("share", "low", "high"))
+        label = f"{words.get(category, category)} ({sum(r['of'] for r in rows)} cases)"
+        reach = np.maximum([y - low, high - y], 0)
+        ax.errorbar(x, y, reach, marker="o", ms=5, lw=1.2, elinewidth=0.8, color=SERIES[k % 8], label=label)
+    ax.set_xlim(0, 0.5)
+    ax.set_ylim(-0.03, 1.03)
+    ax.set_xlabel("rest over the weakest effect (middle of the bin)")
+    ax.set_ylabel("share of cases, no wrong name")
+    ax.legend(fontsize=8, frameon=False, loc="lower left")
     return figure
 
 
