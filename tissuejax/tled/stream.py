@@ -37,7 +37,9 @@ def _go_on(scene: Scene, state: State) -> Outcome:
 _chunk = jax.jit(_go_on, compiler_options=COMPILER_OPTIONS)
 
 
-def run_to_file(scene: Scene, path: str | Path, progress: Progress = SILENT, chunks: int | None = None) -> Path:
+def run_to_file(
+    scene: Scene, path: str | Path, progress: Progress = SILENT, chunks: int | None = None, chunk: int = CHUNK
+) -> Path:
     """Simulate a scene chunk by chunk into an HDF5 file; go on where the file ends.
 
     Args:
@@ -45,14 +47,15 @@ def run_to_file(scene: Scene, path: str | Path, progress: Progress = SILENT, chu
         path: `/channels/*` grow by frames, `/states/displacement/K` (N, 3) after chunk K, `/resume` is the last state.
         progress: told after each chunk.
         chunks: stop after so many (None: to the end).
+        chunk: frames in each; a run is gone on with in the chunks it began with.
 
     Raises:
         UnstableSimulation: with the file holding all that was computed before.
         InputError: a file that belongs to another scene.
     """
     path, scene = Path(path), scene.cast(scene.body.points.dtype)
-    total = -(-scene.clock.frames // CHUNK)
-    work = scene.put({"clock.frames": CHUNK})
+    total = -(-scene.clock.frames // chunk)
+    work = scene.put({"clock.frames": chunk})
     state = _rest(scene)
     with h5py.File(path, "a") as file:
         done = int(file.attrs.get("chunks", 0))
@@ -64,7 +67,7 @@ def run_to_file(scene: Scene, path: str | Path, progress: Progress = SILENT, chu
         stop = total if chunks is None else min(total, done + chunks)
         with progress.stage("simulating", total=stop - done) as stage:
             for k in range(done, stop):
-                part = work.put({"clock.start": scene.clock.start + scene.clock.interval * (k * CHUNK)})
+                part = work.put({"clock.start": scene.clock.start + scene.clock.interval * (k * chunk)})
                 out = _chunk(part, state)
                 check(out, part)
                 state = out.state

@@ -1,0 +1,78 @@
+"""Simulate and predict: the files they write hold what the textbook says, and go back in."""
+
+import csv
+import json
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from tests.probing import bench
+from tissuejax.cli import main
+from tissuejax.errors import InputError
+from tissuejax.experiments.virtual import corners
+from tissuejax.recordings.files import read, write
+
+
+def rows(path):
+    with open(path) as file:
+        return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
+
+
+def test_corners_are_joined_by_lines():
+    time, drive = corners("0:1 2:1.2 4:1.2", 2.0)
+    np.testing.assert_allclose(time, [0, 0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4])
+    np.testing.assert_allclose(drive, [1, 1.05, 1.1, 1.15, 1.2, 1.2, 1.2, 1.2, 1.2])
+    assert corners("0:1,1 1:1.2,1.1", 1.0)[1].shape == (2, 2)
+    for wrong in ("0:1", "1:1 0:2", "a:b c:d", "0 1"):
+        with pytest.raises(InputError, match="corners"):
+            corners(wrong, 1.0)
+
+
+def test_a_simulated_tension_test_is_the_textbook_one_and_can_be_fitted(tmp_path, capsys):
+    path = ["--mode", "uniaxial", "--path", "0:1 10:1.4", "--rate", "4"]
+    assert main(["simulate", "-e", "neo-hookean", "--set", "energy.mu=3 kPa", *path, "-o", str(tmp_path)]) == 0
+    told = rows(tmp_path / "uniaxial-nominal_stress.csv")
+    l = np.array([r["stretch (1)"] for r in told])
+    np.testing.assert_allclose([r["nominal_stress (Pa)"] for r in told], 3000 * (l - l**-2), rtol=1e-6, atol=1e-4)
+    noisy = tmp_path / "noisy"
+    again = ["-e", "neo-hookean", "--set", "energy.mu=3 kPa", *path, "--noise", "15 Pa", "-o", str(noisy), "--json"]
+    assert main(["simulate", *again]) == 0
+    capsys.readouterr()
+    file = noisy / "neo-hookean-simulated.h5"
+    assert read(file).recordings["uniaxial"].channels["nominal_stress"].noise_std == 15.0
+    assert (
+        main(["fit", str(file), "-e", "neo-hookean", "--multistart", "1", "-o", str(tmp_path / "fit"), "--json"]) == 0
+    )
+    fit = json.loads(capsys.readouterr().out)["parameters"]["energy.mu"]
+    assert abs(fit["value"] - 3000) < 4 * fit["std"]
+    predicted = ["predict", str(tmp_path / "fit" / "result.json"), str(file), "-o", str(tmp_path / "p"), "--json"]
+    assert main(predicted) == 0
+    for row in rows(tmp_path / "p" / "uniaxial-nominal_stress.csv"):
+        l = row["stretch (1)"]
+        assert row["nominal_stress (Pa)"] == pytest.approx(fit["value"] * (l - l**-2), abs=1e-3)
+        assert abs(row["nominal_stress measured (Pa)"] - row["nominal_stress (Pa)"]) < 5 * 15 + 1
+
+
+def test_what_cannot_be_simulated_is_refused(tmp_path, capsys):
+    base = ["simulate", "-e", "neo-hookean", "-o", str(tmp_path)]
+    assert main([*base, "--path", "0:1 1:1.1", "--states"]) == 2
+    assert main([*base, "--path", "0:1 1:1.1", "--published", "in-vivo-1"]) == 2
+    assert main([*base, "--path", "0:1 1:-1.1"]) == 2
+    assert "positive" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_states_of_a_probing_can_be_opened_and_pictured(tmp_path, capsys):
+    meshio = pytest.importorskip("meshio")
+    write(bench.sample(), tmp_path / "probe.h5")
+    t = np.arange(0, 2.41, 0.05)
+    z = 0.015 + 0.008 + np.interp(t, [0, 0.2, 1.0, 1.6, 2.2, 2.4], [5e-4, 5e-4, -3e-3, -3e-3, 1e-3, 1e-3])
+    np.savetxt(tmp_path / "path.csv", np.stack([t, 0 * t, 0 * t, z], 1), delimiter=",", header="t,x,y,z", comments="")
+    what = ["--body", str(tmp_path / "probe.h5"), "--path", str(tmp_path / "path.csv"), "--radius", "8 mm"]
+    how = ["--states", "--mesh", "file", "--compression", "20", "-o", str(tmp_path / "out"), "--json"]
+    assert main(["simulate", "-e", "neo-hookean", "--set", "energy.mu=1 kPa", *what, *how]) == 0
+    files = json.loads(capsys.readouterr().out)["files"]
+    deepest = min(meshio.read(p).point_data["displacement"][:, 2].min() for p in (tmp_path / "out").glob("*.vtu"))
+    assert deepest == pytest.approx(-3e-3, rel=0.15)  # contact is a penalty, the mesh coarse
+    assert ("probing picture" in files) == (find_spec("pyvista") is not None)

@@ -1,0 +1,166 @@
+"""`tissuejax simulate` and what it shares with `predict`: a material and a path give a recording."""
+
+import argparse
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.results import Known, add_source, known
+from tissuejax.energies.catalogue import volumetric
+from tissuejax.errors import InputError
+from tissuejax.experiments.predictor import predictor
+from tissuejax.experiments.virtual import as_measured, corners, material_test, probing
+from tissuejax.model import Model
+from tissuejax.progress import for_terminal
+from tissuejax.recordings.files import read, write
+from tissuejax.recordings.recording import Recording, Sample
+from tissuejax.report.recording_tables import write_table
+from tissuejax.units import quantity
+
+BULK = 20  # bulk over shear modulus of a body fitted as incompressible, where it has to be simulated
+
+
+class Simulate(Command):
+    """A recording from a model."""
+
+    name: ClassVar[str] = "simulate"
+    order: ClassVar[int] = 37
+    summary: ClassVar[str] = "a recording that a model would give, for a rig or probe path; states for ParaView"
+    teaches: ClassVar[str] = """
+What a material would show in a test: a recording file (HDF5), CSV tables, and for probings the deformed states.
+
+  tissuejax simulate --published in-vivo-1 --mode uniaxial --path "0:1 10:1.3 40:1.3 50:1"
+  tissuejax simulate out/liver/result.json --mode planar --path path.csv --noise "20 Pa"
+  tissuejax simulate --energy neo-hookean --set "energy.mu=3 kPa" --mode equibiaxial --path "0:1 1:1.2 60:1.2"
+  tissuejax simulate out/liver/result.json --body liver.h5 --path probe.csv --radius "8 mm" --states
+
+--path is corners TIME:VALUE in seconds and stretch (or shear; biaxial: TIME:A,B), or a CSV with a header and columns
+time and stretch (two for biaxial), in s; for a probing time, x, y, z of the tip's centre in s and m. --body FILE gives
+the body of a probing. With --states: HDF5, XDMF and VTU series for ParaView, and, where pyvista is installed, a picture
+and an animation. Without --noise nothing is added; the noise level in the file is then a placeholder, 1e-6 of the peak.
+"""
+
+    def arguments(self, parser: argparse.ArgumentParser) -> None:
+        """A material, a path, and where to write."""
+        add_source(parser)
+        parser.add_argument(
+            "--mode", default="uniaxial", metavar="KIND", help="uniaxial, planar, equibiaxial, biaxial, simple-shear"
+        )
+        parser.add_argument("--path", required=True, metavar="PATH", help="corners TIME:VALUE, or a CSV file")
+        parser.add_argument("--rate", type=float, default=10.0, metavar="HZ", help="samples a second (default 10)")
+        parser.add_argument("--body", metavar="FILE", help="sample with a body: simulate a probing of it")
+        parser.add_argument("--radius", metavar="VALUE", help='of the tip, e.g. "8 mm"')
+        add_output(parser)
+        parser.add_argument("--noise", metavar="VALUE", help='noise to add, e.g. "20 Pa" or "3 mN"')
+        parser.add_argument("--seed", type=int, default=0, help="of the noise (default 0)")
+
+    def run(self, given: argparse.Namespace) -> Reply:
+        """Make the recording, predict it, write it."""
+        of = known(given)
+        if given.body is None:
+            if not given.rate > 0:
+                raise InputError(f"--rate {given.rate:g}: wanted are samples a second, above 0")
+            time, drive = (
+                table(given.path, "stretch") if Path(given.path).is_file() else corners(given.path, given.rate)
+            )
+            sample = Sample(f"{of.name}-simulated", {given.mode: material_test(given.mode, given.mode, time, drive)})
+        else:
+            if given.radius is None:
+                raise InputError('a probing needs the radius of the tip: --radius "8 mm"')
+            body = read(given.body)
+            time, path = table(given.path, "probe position")
+            made = probing("probing", time, path, quantity(given.radius, "m", "--radius"))
+            sample = Sample(f"{body.name}-simulated", {"probing": made}, body.geometry, body.density, body.gravity)
+        unit = "N" if given.body else "Pa"
+        noise = None if given.noise is None else quantity(given.noise, unit, "--noise")
+        out = given.out or Path("out") / sample.name
+        return simulated(of, sample, tuple(sample.recordings), given, out, noise)
+
+
+def add_output(parser: argparse.ArgumentParser) -> None:
+    """--states, --no-pictures, --compression, --out."""
+    parser.add_argument("--states", action="store_true", help="of a probing: the deformed states too")
+    parser.add_argument("--no-pictures", action="store_true", help="no picture or animation of the states")
+    parser.add_argument("--compression", type=float, metavar="F", help="of a probing: run F times faster than life")
+    parser.add_argument("--mesh", choices=["graded", "file"], help="of a probing: the file's mesh or a graded one")
+    parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="default: out/NAME-simulated")
+
+
+def simulated(
+    of: Known, sample: Sample, names: tuple[str, ...], given: argparse.Namespace, out: Path,
+    noise: float | None = None, measured: bool = False,
+) -> Reply:  # fmt: skip
+    """Predict `names` of a sample and write recording file, tables and states; `measured` puts the data beside."""
+    assumed: list[str] = []
+    probings = [n for n in names if sample.recordings[n].experiment == "probing"]
+    options = {}
+    model, values = Model(of.model.energy, of.model.volumetric, of.model.effects), of.values
+    if probings:
+        options = {k: getattr(given, k) for k in ("compression", "mesh") if getattr(given, k) is not None}
+        if model.volumetric is None:
+            model = Model(model.energy, volumetric("quadratic"), model.effects)
+            constants = {n.removeprefix("energy."): v for n, v in values.items() if n.startswith("energy.")}
+            K = BULK * float(model.energy.initial_shear_modulus(constants))
+            values = values | {"volumetric.K": K}
+            assumed = [f"the body was taken as nearly incompressible, K = {K:.4g} Pa ({BULK} shear moduli)"]
+    made = predictor(model, sample, names, **options)
+    values = {p: v for p, v in values.items() if p in made.model.parameters or p in made.model.declared}
+    missing = [p for p, d in made.model.parameters.items() if d.each and p not in values]
+    predicted = made.predict(values)
+    told = as_measured(predicted, sample.recordings, noise, getattr(given, "seed", 0))
+    kept = Sample(sample.name, told, sample.geometry, sample.density, sample.gravity, f"predicted by {of.name}", "")
+    files = {"recording": write(kept, out / f"{sample.name}.h5")}
+    for name, recording in told.items():
+        paths = write_table(recording, out, sample.recordings[name] if measured else None)
+        files |= {p.stem: p for p in paths}
+    notes = assumed
+    if missing:
+        own = ", ".join(missing)
+        notes.append(f"{own}: a value of its own for each recording, not known here; taken as neutral")
+    if given.states and not probings:
+        raise InputError("--states is for probings: a material test has one state of strain everywhere")
+    for name in probings if given.states else ():
+        files |= _states(
+            made, values, name, out, predicted[name], sample.recordings[name] if measured else None, given, notes
+        )
+    peaks = {n: _peaks(r) for n, r in told.items()}
+    lines = [f"{n}: " + ", ".join(f"{c} to {v:.4g} {u}" for c, (v, u) in p.items()) for n, p in peaks.items()]
+    lines += [f"  ! {note}" for note in notes] + [f"{k:<24}{p}" for k, p in files.items()]
+    record = {"recordings": peaks, "notes": notes, "files": {k: str(p) for k, p in files.items()}}
+    return Reply(record, "\n".join(lines))
+
+
+def _states(made, values, name, out, predicted: Recording, measured, given, notes) -> dict[str, Path]:
+    from tissuejax.experiments.probing_states import keep_states
+    from tissuejax.report.scene_pictures import film, write_pictures
+
+    found = keep_states(made, values, name, out, for_terminal())
+    if not given.no_pictures:
+        try:
+            found |= write_pictures(film(found["states"], predicted, measured), out)
+        except InputError as error:
+            notes.append(str(error))
+    return {f"{name} {key}": path for key, path in found.items()}
+
+
+def _peaks(recording: Recording) -> dict[str, tuple[float, str]]:
+    return {
+        name: (float(np.nanmax(np.abs(np.asarray(c.values, float)))), c.unit) for name, c in recording.channels.items()
+    }
+
+
+def table(path: str, what: str) -> tuple[np.ndarray, np.ndarray]:
+    """Time and the other columns of a CSV with one header line.
+
+    Raises:
+        InputError: no such file, cells that are no numbers, fewer than two rows or columns.
+    """
+    try:
+        rows = np.atleast_2d(np.genfromtxt(path, delimiter=",", skip_header=1))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: not a CSV of time and {what} ({error})") from error
+    if rows.shape[0] < 2 or rows.shape[1] < 2 or not np.isfinite(rows).all():
+        raise InputError(f"{path}: wanted are a header line and rows of numbers, time (s) and {what}, with commas")
+    return rows[:, 0], rows[:, 1] if rows.shape[1] == 2 else rows[:, 1:]

@@ -1,0 +1,86 @@
+"""Recordings that nobody made: a rig or probe path written down, to be filled with a prediction."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from jaxtyping import Float
+
+from tissuejax.errors import InputError
+from tissuejax.experiments.catalogue import experiment
+from tissuejax.recordings.recording import Channel, Recording
+
+UNKNOWN_NOISE = 1e-6  # share of the peak written as the noise of a prediction, since a recording file must have one
+
+
+def corners(text: str, rate: float) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n ..."]]:
+    """Time and drive through the corners "0:1 10:1.3 40:1.3", s and stretch (or shear), sampled at `rate` Hz.
+
+    Several driven directions are written with a comma: "0:1,1 10:1.2,1.1".
+
+    Raises:
+        InputError: not of that form, times that don't increase, fewer than two corners.
+    """
+    try:
+        pairs = [part.split(":") for part in text.split()]
+        time = np.array([float(t) for t, _ in pairs])
+        drive = np.array([[float(v) for v in values.split(",")] for _, values in pairs])
+    except ValueError:
+        raise InputError(f'path "{text}": wanted are corners TIME:VALUE, such as "0:1 10:1.3 40:1.3"') from None
+    if len(time) < 2 or not (np.diff(time) > 0).all():
+        raise InputError(f'path "{text}": wanted are two corners or more, at increasing times')
+    fine = np.linspace(time[0], time[-1], max(2, int(round(np.ptp(time) * rate)) + 1))
+    each = np.stack([np.interp(fine, time, column) for column in drive.T], axis=-1)
+    return fine, each[:, 0] if each.shape[1] == 1 else each
+
+
+def material_test(name: str, kind: str, time: np.ndarray, drive: np.ndarray, **attributes) -> Recording:
+    """A material test without a measurement.
+
+    Raises:
+        InputError: an unknown kind, or a drive that is none of it.
+    """
+    test = experiment(kind)
+    if test.kind != "homogeneous":
+        raise InputError(f"{kind} is no material test; a probing needs the body it is made on")
+    empty = {"nominal_stress": Channel(time, np.zeros(np.shape(drive)), "Pa")}
+    made = Recording(name, kind, {"time": time, test.driven: drive}, empty, attributes)
+    test.test(made)
+    return made
+
+
+def probing(
+    name: str, time: np.ndarray, path: Float[np.ndarray, "n 3"], radius: float, markers: np.ndarray | None = None
+) -> Recording:
+    """A probing along `path` (centre of the tip, m), not measured; `markers` (k, 3) are places on the surface."""
+    channels = {"force": Channel(time, np.zeros((len(time), 3)), "N", 1e-3)}
+    if markers is not None:
+        channels["markers"] = Channel(time, np.tile(markers, (len(time), 1, 1)), "m", 1e-5)
+    return Recording(
+        name, "probing", {"probe/time": time, "probe/position": path}, channels, {"probe/radius": float(radius)}
+    )
+
+
+def as_measured(
+    predicted: Mapping[str, Recording], measured: Mapping[str, Recording], noise: float | None = None, seed: int = 0
+) -> dict[str, Recording]:
+    """Predictions as recordings: with the measured channels' noise level written down, or with noise added.
+
+    Args:
+        predicted: by name.
+        measured: what they stand for.
+        noise: standard deviation to add, SI; None adds nothing and keeps the level the measurement states, or a
+            millionth of the peak where there is none.
+        seed: of the noise.
+    """
+    rng, found = np.random.default_rng(seed), {}
+    for name, recording in predicted.items():
+        channels = {}
+        for key, channel in recording.channels.items():
+            values, stated = np.asarray(channel.values, float), measured[name].channels[key].noise_std
+            if noise is not None:
+                values, level = values + rng.normal(0.0, noise, values.shape), noise
+            else:
+                level = stated or UNKNOWN_NOISE * (float(np.nanmax(np.abs(values), initial=0.0)) or 1.0)
+            channels[key] = Channel(channel.time, values, channel.unit, level)
+        found[name] = Recording(name, recording.experiment, recording.inputs, channels, recording.attributes)
+    return found
