@@ -40,6 +40,9 @@ KEPT = (
     "before",
     "after",
     "probabilities",
+    "inclusion",
+    "something_missing",
+    "used",
 )
 
 
@@ -61,10 +64,21 @@ def diagnosed(entry: panel_samples.Entry) -> dict:
     return {"id": entry.id, "energy": entry.energy, **record, "seconds": time.perf_counter() - begun}
 
 
+def in_turn(entries: list[panel_samples.Entry]) -> list[panel_samples.Entry]:
+    """The first sample of every protocol, then the second of each: a study that is stopped has some of everything."""
+    seen: dict[tuple, int] = {}
+    order = []
+    for e in entries:
+        protocol = (e.key, e.ogden_form, e.energy if e.key == "ecoflex" else "")
+        seen[protocol] = seen.get(protocol, 0) + 1
+        order.append((seen[protocol], e))
+    return [e for _, e in sorted(order, key=lambda x: x[0])]
+
+
 def main(folder: Path) -> str:
     """Diagnose what has no result yet, grade all that has one; returns the answer in a sentence."""
     causes, words = read_causes(folder / "causes.toml")
-    listed = panel_samples.entries(tomllib.loads((folder / "causes.toml").read_text()))
+    listed = in_turn(panel_samples.entries(tomllib.loads((folder / "causes.toml").read_text())))
     wanted = [k for k in os.environ.get("PANEL_ONLY", "").split(",") if k]
     part, parts = (int(n) for n in os.environ.get("PANEL_PART", "0/1").split("/"))  # two processes share the work
     left = [e for e in listed if not file_of(folder, e.id).exists() and (not wanted or e.key in wanted)][part::parts]
