@@ -97,6 +97,7 @@ def diagnose(
             found = search_probing(bench, budget, told)
         else:
             found = search(bench, budget, told, KeptRefits(bench, keep))
+            bench.warnings += [] if more else found.misfit.remarks()  # of noise that was recorded
     verdict = decide(found)
     if kind == "homogeneous":
         ideas = settling([proposals(sample, base, bench, verdict.chosen, r, None) for r in verdict.rivals[:3]])

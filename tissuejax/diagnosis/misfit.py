@@ -11,16 +11,18 @@ from tissuejax.estimation.correlation import Series, estimate
 from tissuejax.estimation.noise import Noise
 
 WHITE = Noise()
+WRONG = 1.2  # white noise over the recorded level from which the recorded one is not believed; few know theirs better
 Place = tuple[str, str]  # recording, channel
 
 
 @dataclass(frozen=True)
 class Misfit:
-    """Whitens long vectors of a bench, segment by segment, in units of the recorded standard deviation.
+    """Whitens long vectors of a bench, segment by segment.
 
     Attributes:
         bench: the sample on the table.
-        noises: shape of the noise (standard deviation 1) by recording and channel; white where none is named.
+        noises: by recording and channel, in units of the recorded standard deviation: 1 all in all, or more where the
+            residuals hold more white noise than was recorded; white where none is named.
         levels: by recording and channel, the noise's standard deviation over the recorded one as the residuals have
             it, mismatch left aside, where that was estimated.
     """
@@ -34,7 +36,7 @@ class Misfit:
         return [s for s in self.bench.segments if s.recording in recordings]
 
     def noise(self, s: Segment) -> Noise:
-        """The shape of the noise of a segment."""
+        """The noise of a segment."""
         return self.noises.get((s.recording, s.channel), WHITE)
 
     def white(self, x: Float[np.ndarray, "n ..."], s: Segment) -> Float[np.ndarray, "n ..."]:
@@ -66,9 +68,21 @@ class Misfit:
                 step = float(np.median(np.diff(s.time)))
                 one, two = self.noise(s), other.noise(s)
                 near = abs(float(one.correlation(step)) - float(two.correlation(step)))
-                if near > 0.05 or abs(one.share - two.share) > 0.1:
+                if near > 0.05 or abs(one.share - two.share) > 0.1 or abs(one.std / two.std - 1) > 0.05:
                     return True
         return False
+
+    def remarks(self) -> list[str]:
+        """What is said where white noise exceeds the recorded level."""
+        seen = {r: max(level for (name, _), level in self.levels.items() if name == r) for r, _ in self.levels}
+        wrong = {r: level for r, level in seen.items() if level > WRONG}
+        if not wrong:
+            return []
+        said = ", ".join(f"{level:.1f} times in {r}" for r, level in wrong.items())
+        return [
+            f"check the noise level: what is left is white but larger than the recorded noise ({said}), which missing "
+            "physics is not; the larger level was used in all that follows"
+        ]
 
 
 def white(bench: Bench) -> Misfit:
@@ -93,7 +107,10 @@ def estimated(bench: Bench, prediction: Float[np.ndarray, " N"]) -> Misfit:
         ]
         found = estimate(series)
         for name, noise, level in zip(blocks, found.noises, found.levels):
-            noises[name, channel], levels[name, channel] = noise, level
-        longest = found.noises[int(np.argmax([len(s.time) for s in series]))] if series else WHITE
-        noises |= {(name, channel): longest for name in bench.held_out}
+            too_large = level > WRONG and noise.share == 0
+            noises[name, channel] = noise.scaled(level) if too_large else noise
+            levels[name, channel] = level
+        if blocks:
+            longest = max(blocks, key=lambda name: len(blocks[name][0].time))
+            noises |= {(name, channel): noises[longest, channel] for name in bench.held_out}
     return Misfit(bench, noises, levels)

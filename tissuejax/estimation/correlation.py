@@ -46,10 +46,12 @@ class Series:
     Attributes:
         time: s.
         values: one row a sample.
+        kinks: samples from which on a smooth part may have another slope (where a ramp ends).
     """
 
     time: Float[np.ndarray, " n"]
     values: Float[np.ndarray, "n k"]
+    kinks: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -67,8 +69,11 @@ class Estimate:
     common: bool = True
 
 
-def estimate(series: Sequence[Series]) -> Estimate:
+def estimate(series: Sequence[Series], recorded: bool = True) -> Estimate:
     """Correlation of the noise in several residuals.
+
+    Args:
+        recorded: False where the standard deviation was not recorded: then correlated noise may have any.
 
     Returns:
         White noise where nothing else is clearly better; short series (< `LEAST` samples) take the shape of the others
@@ -78,7 +83,7 @@ def estimate(series: Sequence[Series]) -> Estimate:
     levels = [float(np.std(s.values)) or 1.0 if len(s.time) else 1.0 for s in series]
     if not long:
         return Estimate((Noise(),) * len(series), tuple(levels))
-    surfaces = [_Surface(series[i]) for i in long]
+    surfaces = [_Surface(series[i], recorded) for i in long]
     shared = _best(surfaces)
     price = 2 * (len(surfaces) - 1) * math.log(sum(s.n for s in surfaces))
     common = 2 * shared.apart < 0.5 * price  # on a coarse grid; the rest is seen where it may matter
@@ -95,7 +100,8 @@ def estimate(series: Sequence[Series]) -> Estimate:
 class _Surface:
     """The likelihood of one series, the walk's intensity and the level at their best."""
 
-    def __init__(self, series: Series):
+    def __init__(self, series: Series, capped: bool = True):
+        self.capped = capped
         time = np.asarray(series.time, float) - series.time[0]
         self.n, self.columns = len(time), series.values.reshape(len(time), -1).T
         self.span, self.step = time[-1], float(np.median(np.diff(time)))
@@ -108,6 +114,7 @@ class _Surface:
         padded = 3 * power // 4 if self.n <= 3 * power // 4 else power  # few lengths, few programs
         self.steps = np.pad(np.diff(time), (0, padded - self.n + 1))
         self.seen = np.arange(padded) < self.n
+        self.turns = np.isin(np.arange(padded), series.kinks)
         self.padded = [np.pad(c, (0, padded - self.n)) for c in self.columns]
 
     @staticmethod
@@ -126,11 +133,15 @@ class _Surface:
         """
         trials = [x.ravel() for x in np.meshgrid(shares, taus, walks, indexing="ij")]
         with jax.enable_x64(True):
-            parts = [_filtered(self.steps, c, self.seen, *trials, *self.prior) for c in self.padded]
+            parts = [_filtered(self.steps, c, self.seen, self.turns, *trials, *self.prior) for c in self.padded]
         logs, squares = (np.sum([np.asarray(part[i]) for part in parts], axis=0) for i in (0, 1))
         n = self.n * len(parts)
         # white noise may exceed what was recorded, nothing else is like it; correlated noise may not
-        variance = np.clip(squares / n, 1e-300, np.where(trials[0] > 0, 1.0, np.inf)) if free else np.ones(len(logs))
+        variance = (
+            np.clip(squares / n, 1e-300, np.where((trials[0] > 0) & self.capped, 1.0, np.inf))
+            if free
+            else np.ones(len(logs))
+        )
         likelihood = -0.5 * (n * np.log(variance) + logs + squares / variance)
         shape = (len(shares), len(taus), len(walks))
         likelihood, variance = likelihood.reshape(shape), variance.reshape(shape)
@@ -160,6 +171,8 @@ def _best(surfaces: Sequence[_Surface]) -> _Found:
     found = _correlated(surfaces, [float(t[0][0, 0]) for t in told], True)
     if 2 * (found.likelihood - white.likelihood) <= GAIN:
         return replace(white, apart=found.apart)
+    if not surfaces[0].capped:
+        return found
     recorded = _correlated(surfaces, [-math.inf] * len(surfaces), False, near=found)
     if 2 * (found.likelihood - recorded.likelihood) > GAIN * len(surfaces):
         return found
@@ -211,7 +224,7 @@ def _narrowed(limits: tuple[float, float], best: float) -> tuple[float, float]:
     return at - step, at + step
 
 
-def _filter(steps, y, seen, share, tau, walk, diffuse, span):
+def _filter(steps, y, seen, turns, share, tau, walk, diffuse, span):
     """Sum of the logarithms of the innovations' variances and of their squares over these, for every trial.
 
     State: correlated noise u, level a and slope b of the mismatch; y = u + a + white. Variances are in units of the
@@ -222,7 +235,9 @@ def _filter(steps, y, seen, share, tau, walk, diffuse, span):
 
     def advance(carry, now):
         (u, a, b), (uu, ua, ub, aa, ab, bb), logs, squares = carry
-        dt, value, there = now
+        dt, value, there, turn = now
+        b, ub, ab = (jnp.where(turn, 0.0, x) for x in (b, ub, ab))
+        bb = jnp.where(turn, diffuse / span**2, bb)
         hu, ha, hb = uu + ua, ua + aa, ub + ab
         variance = hu + ha + white
         error = jnp.where(there, value - u - a, 0.0)
@@ -242,7 +257,7 @@ def _filter(steps, y, seen, share, tau, walk, diffuse, span):
         return ((fade * u, a + dt * b, b), (uu, ua, ub, aa, ab, bb), logs, squares), None
 
     first = ((none, none, none), (share, none, none, none + diffuse, none, none + diffuse / span**2), none, none)
-    return jax.lax.scan(advance, first, (steps, y, seen))[0][2:]
+    return jax.lax.scan(advance, first, (steps, y, seen, turns))[0][2:]
 
 
 _filtered = Kept(_filter, "estimation.correlation._filter")

@@ -1,0 +1,148 @@
+"""How large noise is that was not recorded: from what a response to the drive can't be.
+
+Differences between neighbours see white noise only: noise that is correlated, filtered or quantised differs little from
+one sample to the next and comes out too small. So the response is taken out first, by a description that knows no
+particular material: powers of the drive, each at once and fading over several times (the leading terms of a
+Green-Rivlin expansion). What is left holds the noise and a smooth rest; the two are told apart by their spectra
+(`estimation.correlation`), and what the description took of slow noise is put back.
+
+Sources: Green and Rivlin 1957, Arch. Ration. Mech. Anal. 1:1 (multiple-integral expansion); Gasser, Sroka and
+Jennen-Steinmetz 1986, Biometrika 73:625 (differences, for short series); Widrow and Kollar 2008, Quantization Noise,
+ch. 1 (q^2/12).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.signal import lfilter
+
+from tissuejax.estimation.correlation import LEAST, Series, estimate
+from tissuejax.estimation.noise import Noise
+
+THIRD = np.array([1.0, -3.0, 3.0, -1.0])
+POWERS = (1, 2, 3)
+FADES = (0.012, 0.08, 0.5)  # of the recording: times over which the response forgets
+KINK = 0.25  # of the fastest drive: change of rate from which the response may turn sharply
+LEVELS = 0.25  # distinct values a sample below which a series is called quantised
+SMOOTH = 2.0  # what is left over noise, from which the smooth part may itself be slow noise
+
+
+@dataclass(frozen=True)
+class Response:
+    """One measured series and what was done.
+
+    Attributes:
+        time: s.
+        drive: stretch, shear or whatever was imposed, any unit.
+        values: what was measured.
+    """
+
+    time: Float[np.ndarray, " n"]
+    drive: Float[np.ndarray, " n"]
+    values: Float[np.ndarray, " n"]
+
+
+@dataclass(frozen=True)
+class Level:
+    """Noise of a series as far as the series tells.
+
+    Attributes:
+        std: standard deviation, unit of the values.
+        noise: its shape.
+        left: standard deviation of all that the description of the response left, the smooth part included.
+        resolution: step of the recorded values; 0 where none shows.
+        short: whether the series was too short for anything but differences of neighbours.
+    """
+
+    std: float
+    noise: Noise = Noise()
+    left: float = 0.0
+    resolution: float = 0.0
+    short: bool = False
+
+    @property
+    def certain(self) -> bool:
+        """Whether slow noise and a slow part of the response were told apart."""
+        return self.short or self.left < SMOOTH * self.std
+
+
+def rough(y: Float[np.ndarray, " n"]) -> float:
+    """Standard deviation of white noise on a smooth series: from third differences, by their median."""
+    d = np.convolve(y, THIRD, "valid") / np.sqrt(np.sum(THIRD**2))
+    return float(np.median(np.abs(d)) / 0.6745) if len(d) else 0.0
+
+
+def resolution(y: Float[np.ndarray, " n"]) -> float:
+    """Step between neighbouring values of a quantised series; 0 where samples seldom repeat a value."""
+    y = y[np.isfinite(y)]
+    distinct = np.unique(y)
+    if len(distinct) < 2 or len(distinct) > LEVELS * len(y):
+        return 0.0
+    steps = np.diff(distinct)
+    step = float(np.min(steps[steps > 1e-9 * np.ptp(y)]))
+    off = np.abs(steps / step - np.round(steps / step))
+    return step if np.all(off < 0.05) else 0.0
+
+
+def kinks(time: Float[np.ndarray, " n"], drive: Float[np.ndarray, " n"], width: int = 3) -> tuple[int, ...]:
+    """Samples where the rate of the drive changes at once."""
+    n = len(time)
+    if n < 4 * width:
+        return ()
+    rate = (drive[width:] - drive[:-width]) / (time[width:] - time[:-width])
+    change = np.zeros(n)
+    change[width : n - width] = np.abs(rate[width:] - rate[:-width])
+    limit = KINK * float(np.max(np.abs(rate)))
+    return tuple(
+        k
+        for k in range(width, n - width)
+        if change[k] > limit and change[k] == np.max(change[max(k - width, 0) : k + width + 1])
+    )
+
+
+def description(time: Float[np.ndarray, " n"], drive: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n k"]:
+    """Orthonormal columns that span a response to the drive: powers of it, at once and fading, a level and a slope."""
+    span = time[-1] - time[0]
+    e = (drive - drive[0]) / (float(np.max(np.abs(drive - drive[0]))) or 1.0)
+    columns = [np.ones_like(time), (time - time[0]) / span]
+    for power in POWERS:
+        columns.append(e**power)
+        columns += [_fading(time, e**power, share * span) for share in FADES]
+    columns = np.stack(columns, 1)
+    u, s, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0).clip(1e-300), full_matrices=False)
+    return u[:, s > 1e-6 * s[0]]
+
+
+def _fading(time: np.ndarray, x: np.ndarray, tau: float) -> np.ndarray:
+    """Part of x that was imposed within about tau: increments that fade; exact between samples of a straight x."""
+    even = np.linspace(time[0], time[-1], len(time))
+    step = even[1] - even[0]
+    keep = math.exp(-step / tau)
+    fresh = np.diff(np.interp(even, time, x), prepend=x[0]) * (1 - keep) / (step / tau)
+    return np.interp(time, even, lfilter([1.0], [1.0, -keep], fresh))
+
+
+def levels(responses: Sequence[Response]) -> list[Level]:
+    """Noise of several series of one sensor, whose noise has one shape as far as they tell."""
+    long = [i for i, r in enumerate(responses) if len(r.time) >= LEAST]
+    steps = [resolution(r.values) for r in responses]
+    found = [Level(rough(r.values), resolution=s, short=True) for r, s in zip(responses, steps)]
+    series, taken = [], []
+    for i in long:
+        r = responses[i]
+        u = description(r.time, r.drive)
+        left = r.values - u @ (u.T @ r.values)
+        unit = max(rough(r.values), 1e-3 * float(np.std(left))) or 1.0
+        series.append(Series(r.time, left[:, None] / unit, kinks(r.time, r.drive)))
+        taken.append((u, unit, float(np.std(left))))
+    told = estimate(series, recorded=False)
+    for i, noise, level, (u, unit, left) in zip(long, told.noises, told.levels, taken):
+        time = responses[i].time
+        lost = float(np.sum((noise.covariance(time) @ u) * u)) / len(time)  # of the variance, in the description
+        std = unit * level / math.sqrt(max(1 - lost, 0.25))
+        found[i] = Level(std, noise, left, steps[i])
+    floor = [s / math.sqrt(12) for s in steps]
+    return [Level(max(f.std, q), f.noise, f.left, f.resolution, f.short) for f, q in zip(found, floor)]
