@@ -27,6 +27,7 @@ from tissuejax.fitting.stress_curve import fit_stress_curve
 from tissuejax.model import Model
 from tissuejax.progress import Progress, Silent
 from tissuejax.recordings.files import read
+from tissuejax.recordings.plausible import refuse_unusable, slips
 from tissuejax.recordings.recording import Sample
 
 if TYPE_CHECKING:
@@ -120,6 +121,7 @@ def fit(
     if not isinstance(energy, Model):
         energy = material(energy, ogden_form=ogden_form, volumetric=volumetric, effects=effects)
     fitted, held = split(sample, tuple(only), tuple(holdout))
+    refuse_unusable(sample, fitted)
     probing = all(sample.recordings[name].experiment == "probing" for name in fitted)
     if probing and energy.volumetric is None:
         energy = Model(energy.energy, names.volumetric("quadratic"), energy.effects)
@@ -137,21 +139,24 @@ def fit(
     )
     with (progress or Silent()).stage(f"fitting {energy.energy.name} to {sample.name}", None) as stage:
         if method == STRESS_CURVE:
-            return fit_stress_curve(posed, holdout=held)
-        if probing:  # each run is a simulation: one start, few runs, errors that include the numerical one
-            return fit_probed(
+            found = fit_stress_curve(posed, holdout=held)
+        elif probing:  # each run is a simulation: one start, few runs, errors that include the numerical one
+            found = fit_probed(
                 posed, holdout=held, max_steps=min(max_steps, 12), progress=progress, checkpoint=checkpoint
             ).fit
-        return fit_problem(
-            posed,
-            start=dict(posed.start) if start else None,
-            multistart=multistart,
-            method=method,
-            holdout=held,
-            seed=seed,
-            max_steps=max_steps,
-            on_accept=lambda n, chi2, values: stage.advance(note=f"chi-square {chi2:.4g}"),
-        )
+        else:
+            found = fit_problem(
+                posed,
+                start=dict(posed.start) if start else None,
+                multistart=multistart,
+                method=method,
+                holdout=held,
+                seed=seed,
+                max_steps=max_steps,
+                on_accept=lambda n, chi2, values: stage.advance(note=f"chi-square {chi2:.4g}"),
+            )
+    found.warnings.extend(f"Look at the data: {sentence}." for sentence in slips(sample, (*fitted, *held)))
+    return found
 
 
 def diagnose(

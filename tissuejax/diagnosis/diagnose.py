@@ -24,11 +24,13 @@ from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.diagnosis.search import Budget, search
 from tissuejax.diagnosis.sigma import sigmas
 from tissuejax.diagnosis.untimed import timed, without_clock
+from tissuejax.effects.catalogue import effects as all_effects
 from tissuejax.energies.catalogue import energy as named_energy
 from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.catalogue import experiment
 from tissuejax.progress import Progress, Silent
 from tissuejax.recordings.files import read
+from tissuejax.recordings.plausible import refuse_unusable, slips
 from tissuejax.recordings.recording import Sample
 from tissuejax.storage import write_json
 
@@ -66,6 +68,11 @@ def diagnose(
     keep_programs()
     sample = source if isinstance(source, Sample) else read(source)
     fitted, held_out, remarks = split(sample, holdout)
+    refuse_unusable(sample, fitted)
+    for name in effects or ():
+        if name not in all_effects():
+            raise unknown("effect", name, all_effects())
+    remarks += slips(sample, (*fitted, *held_out))
     base = named_energy(energy, ogden_form)
     kind = experiment(sample.recordings[fitted[0]].experiment).kind
     keep = keep or (None if out is None else Path(out) / "runs")

@@ -4,6 +4,7 @@ import numpy as np
 
 from tissuejax.errors import InputError
 from tissuejax.recordings import checks
+from tissuejax.recordings.plausible import slips
 from tissuejax.recordings.recording import Sample
 
 
@@ -26,4 +27,4 @@ def remarks(sample: Sample) -> list[str]:
         stretch = recording.inputs.get("stretch")
         if stretch is not None and abs(float(np.asarray(stretch)[0].max()) - 1.0) > 0.02:
             said.append(f"{name}: starts at stretch {np.asarray(stretch)[0]}, not at rest (1).")
-    return said
+    return said + slips(sample)

@@ -1,0 +1,119 @@
+"""Plausibility at the door: each slip is named, sound recordings pass without a word."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tissuejax.errors import InputError
+from tissuejax.recordings.plausible import refuse_unusable, slips
+from tissuejax.recordings.recording import Channel, Recording, Sample
+
+N = 200
+
+
+def recording(stretch=None, stress=None, time=None, noise=20.0):
+    """A pull to 1.3 with white noise, or what is given instead."""
+    rng = np.random.default_rng(3)
+    time = np.linspace(0, 20, N) if time is None else time
+    stretch = np.linspace(1, 1.3, len(time)) if stretch is None else stretch
+    if stress is None:
+        stress = 4000 * (stretch - stretch**-2) + rng.normal(0, 20, len(time))
+    channel = Channel(time, np.asarray(stress, float), "Pa", noise)
+    return Recording("r", "uniaxial", {"time": time, "stretch": stretch}, {"nominal_stress": channel})
+
+
+def sample(**recordings):
+    return Sample("s", recordings)
+
+
+def said(**changes):
+    return " ".join(slips(sample(r=recording(**changes))))
+
+
+STRETCH = np.linspace(1, 1.3, N)
+STRESS = 4000 * (STRETCH - STRETCH**-2) + np.random.default_rng(4).normal(0, 20, N)
+SLIPS = {
+    "mm as m": ({"stretch": 1 + 1000 * (STRETCH - 1), "stress": STRESS}, "millimetres may have been read as metres"),
+    "um as mm": ({"stretch": 1 + 1e-3 * (STRETCH - 1), "stress": STRESS}, "stays within"),
+    "too stiff": ({"stress": 1e6 * STRESS}, "above 1e+08 Pa"),
+    "too soft": ({"stress": 1e-5 * STRESS}, "no cell resolves"),
+    "turned round": ({"stress": -STRESS}, "a sign is turned round"),
+    "dead": ({"stress": np.zeros(N)}, "zero throughout"),
+    "stuck": ({"stress": np.full(N, 500.0)}, "stuck sensor"),
+    "saturated": ({"stress": np.minimum(STRESS, 2000)}, "the sensor was at its end"),
+    "few": ({"time": np.arange(6.0)}, "6 samples only"),
+    "gap": ({"time": np.concatenate([np.linspace(0, 10, N // 2), np.linspace(60, 70, N // 2)])}, "a gap of 50 s"),
+    "filtered": (
+        {
+            "stress": 4000 * (STRETCH - STRETCH**-2)
+            + np.convolve(np.random.default_rng(5).normal(0, 60, N + 8), np.ones(9) / 9, "valid")
+        },
+        "smoothed or filtered",
+    ),
+    "history": ({"stress": STRESS + 800}, "not at zero"),
+}
+
+
+@pytest.mark.parametrize("slip", SLIPS)
+def test_each_slip_is_named(slip):
+    changes, words = SLIPS[slip]
+    assert words in said(**changes)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_sound_recordings_pass_without_a_word(seed):
+    rng = np.random.default_rng(seed)
+    time = np.linspace(0, 30, 600)
+    stretch = 1 + 0.15 * (1 - np.cos(2 * np.pi * time / 10)) * (1 if seed % 2 else -1)
+    stress = 4000 * (stretch - stretch**-2) + rng.normal(0, 15, 600)
+    assert slips(sample(r=recording(stretch, stress, time))) == []
+
+
+def test_white_noise_is_seldom_called_filtered():
+    called = 0
+    for seed in range(200):
+        stress = 4000 * (STRETCH - STRETCH**-2) + np.random.default_rng(seed).normal(0, 20, N)
+        called += any("filtered" in s for s in slips(sample(r=recording(STRETCH, stress))))
+    assert called <= 4  # 2 %
+
+
+def test_the_demonstration_passes():
+    from tissuejax.recordings.files import read
+
+    for name in ("elastic", "relaxing"):
+        assert slips(read(Path(__file__).parents[2] / "data" / "demo" / f"{name}.h5")) == []
+
+
+UNUSABLE = {
+    "dead": ({"r": recording(stress=np.zeros(N))}, "zero throughout"),
+    "nothing done": ({"r": recording(stretch=np.ones(N), stress=np.full(N, 5.0))}, "nothing to fit"),
+    "two rows": ({"r": recording(time=np.arange(2.0))}, "2 samples"),
+    "noise zero beside noise": ({"a": recording(), "b": recording(noise=0.0)}, "weigh infinitely"),
+}
+
+
+@pytest.mark.parametrize("case", UNUSABLE)
+def test_what_can_not_be_fitted_is_refused(case):
+    recordings, words = UNUSABLE[case]
+    with pytest.raises(InputError, match=words):
+        refuse_unusable(sample(**recordings), recordings)
+
+
+def test_a_dead_sensor_stops_fit_and_diagnosis(tmp_path, capsys):
+    from tissuejax.cli import main
+
+    rows = "".join(f"{k},{1 + 0.001 * k},0\n" for k in range(30))
+    (tmp_path / "t.csv").write_text("time (s),stretch,stress (kPa)\n" + rows)
+    assert main(["import", str(tmp_path / "t.csv")]) == 0
+    for verb in ("fit", "diagnose"):
+        assert main([verb, str(tmp_path / "t.toml"), "--energy", "neo-hookean", "--out", str(tmp_path / "o")]) == 2
+        assert "zero throughout" in capsys.readouterr().err
+
+
+def test_an_unknown_effect_is_refused_before_anything_runs(capsys):
+    from tissuejax.cli import main
+
+    relaxing = str(Path(__file__).parents[2] / "data/demo/relaxing.h5")
+    assert main(["diagnose", relaxing, "--energy", "neo-hookean", "--effect", "viscoelastic"]) == 2
+    assert "Did you mean 'viscoelasticity'" in capsys.readouterr().err
