@@ -1,0 +1,159 @@
+"""From statics to a file: held-out errors, resuming, the file's guards, and what is refused."""
+
+import h5py
+import numpy as np
+import pytest
+
+from tests.surrogate import made
+from tissuejax.errors import InputError
+from tissuejax.surrogate import ramp as ramps
+from tissuejax.surrogate import store
+from tissuejax.surrogate.live.ask import Asker
+from tissuejax.surrogate.places import Box, checked, first_contact, whole_top
+from tissuejax.surrogate.precompute import precompute
+from tissuejax.surrogate.site_mesh import Grid, lines
+
+
+def test_first_contact_of_a_sphere_on_a_sphere():
+    """Over a dome of radius S the ball's centre lies on a sphere of radius S + R."""
+    from tissuejax.mesh.columns import Lobe
+
+    s = np.linspace(0, 1, 41)
+    x, y = np.meshgrid(0.08 * s - 0.04, 0.08 * s - 0.04, indexing="ij")
+    top = np.sqrt(0.06**2 - x**2 - y**2) - 0.02
+    lobe = Lobe.of_grid(s, s, x, y, 0 * x - 0.03, top)
+    box = Box(np.array([-0.01, -0.012]), np.array([0.012, 0.01]), 5e-3, (3, 3))
+    places = box.held_out(8)
+    wanted = np.sqrt((0.06 + 5e-3) ** 2 - (places**2).sum(1)) - 0.02
+    assert first_contact(lobe, box, 5e-3).sample(places)[:, 0] == pytest.approx(wanted, abs=3e-6)
+
+
+def test_the_fine_part_is_the_same_on_both_sides_and_moves_with_the_site():
+    grid = Grid((16, 16, 4), 4.75e-3)
+    for place in ([0.0, 0.0], [0.004, -0.003]):
+        s, t = (0.04 * v - 0.02 for v in lines(made.SLAB, np.array(place), grid))
+        for line, at in ((s, place[0]), (t, place[1])):
+            middle = len(line) // 2
+            assert line[middle] == pytest.approx(at, abs=1e-9)
+            assert line[middle + 1 : middle + 6] - at == pytest.approx(at - line[middle - 5 : middle][::-1], abs=1e-12)
+            assert (np.diff(line) > 0).all()
+
+
+def test_error_at_held_out_places_is_measured_and_small():
+    found = made.small()
+    error = found.record["error"]
+    assert error["states"] == 24
+    assert error["surface_worst_m"] < 2e-4
+    assert error["lateral_worst_N"] < 2e-3
+    # a state of the table itself comes back
+    place = made.SMALL_BOX.sites()[0, 1]
+    contact = 0.014 + 4e-3
+    state = ramps.ramp(made.matter(), made.SMALL, place, contact, made.SMALL_BOX.levels)
+    s = found.surrogate
+    got = [s.elastic(np.array([*place, contact - d]))[2] for d in made.SMALL_BOX.levels]
+    assert np.asarray(got) == pytest.approx(state.force[:, 2], rel=1e-3)
+    assert state.force[-1, 2] > 0.02
+
+
+def test_a_held_press_relaxes_to_the_long_term_share():
+    """Pressed at once and held long, the isochoric part of the work falls by g1 + g2 and no more; the bulk part and the
+    hourglass control of so coarse a mesh do not."""
+    s = made.small().surrogate
+    p = np.array([0.0, 0.0, 0.018 - 1.9e-3])
+    time = np.concatenate([[0, 1e-4], np.linspace(0.1, 60, 50)])
+    path = np.concatenate([[p + [0, 0, 3e-3]], np.tile(p, (51, 1))])
+    asker = Asker(s)
+    force = np.array([asker.tick(p, dt)[2] for p, dt in zip(path, np.diff(time, prepend=0))])
+    share = 1 - force[-1] / force[1]
+    assert 0.1 < share <= 0.35 + 1e-3
+    assert (np.diff(force[1:]) <= 1e-9).all()
+
+
+def test_sites_are_kept_and_a_second_run_takes_them(tmp_path, monkeypatch):
+    first = precompute(made.matter(), made.SMALL_BOX, made.SMALL, keep=tmp_path, processes=1, numerical=False)
+    assert len(list(tmp_path.glob("site-*.npz"))) == 10
+    monkeypatch.setattr("tissuejax.surrogate.precompute.ramp", None)  # nothing is computed again
+    again = precompute(made.matter(), made.SMALL_BOX, made.SMALL, keep=tmp_path, processes=1, numerical=False)
+    assert np.array_equal(first.surrogate.law.coefficients, again.surrogate.law.coefficients)
+
+
+def test_the_file_comes_back_and_damage_is_seen(tmp_path):
+    found = made.small()
+    path = store.write(found, tmp_path / "a.play.h5")
+    back = store.read(path)
+    p = np.array([0.001, -0.002, 0.018 - 1.5e-3])
+    assert np.asarray(back.surrogate.elastic(p)) == pytest.approx(np.asarray(found.surrogate.elastic(p)), rel=1e-12)
+    assert back.record["error"]["force_worst"] == pytest.approx(found.record["error"]["force_worst"], nan_ok=True)
+
+    def spoilt(name, change):
+        copy = tmp_path / name
+        copy.write_bytes(path.read_bytes())
+        with h5py.File(copy, "a") as file:
+            change(file)
+        return copy
+
+    with pytest.raises(InputError, match="hash"):
+        store.read(spoilt("b.h5", lambda f: f["law/coefficients"].__setitem__((0, 0, 0, 0), 7.0)))
+    with pytest.raises(InputError, match="not a number"):
+        store.read(spoilt("c.h5", lambda f: f["law/coefficients"].__setitem__((0, 0, 0, 0), np.nan)))
+    with pytest.raises(InputError, match="version 9"):
+        store.read(spoilt("d.h5", lambda f: f.attrs.__setitem__("version", 9)))
+    with pytest.raises(InputError, match="not a surrogate"):
+        store.read(spoilt("e.h5", lambda f: f.attrs.__setitem__("format", "x")))
+    cut = tmp_path / "f.h5"
+    cut.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.raises(InputError, match="cut off"):
+        store.read(cut)
+    with pytest.raises(InputError, match="no such file"):
+        store.read(tmp_path / "none.h5")
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"depth": 0.0095}, "60 %"),
+        ({"high": np.array([0.019, 0.003])}, "from its rim"),
+        ({"high": np.array([0.025, 0.003])}, "outside the organ"),
+        ({"depth": -1.0}, "positive"),
+    ],
+)
+def test_a_box_that_the_organ_does_not_hold_is_refused(change, word):
+    with pytest.raises(InputError, match=word):
+        checked(made.SMALL_BOX._replace(**change), made.SLAB, 4e-3)
+
+
+def test_the_whole_top_keeps_its_distance_from_the_rim():
+    low, high = whole_top(made.SLAB, 4e-3)
+    assert np.allclose(high, 0.014, atol=1e-3)
+    assert np.allclose(low, -0.014, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("softening", {"m": 50.0, "r": 0.3}),
+        ("base-slip", {"compliance": 1e-6}),
+        ("periodic", {"sin": 1e-3}),
+        ("compressibility", {"drained": 1e-4}),
+    ],
+)
+def test_what_cannot_be_tabulated_is_refused_by_its_name(name, values):
+    from tissuejax import effects
+    from tissuejax.effects.effect import Effect
+    from tissuejax.families import members
+    from tissuejax.surrogate.refusals import refuse
+
+    kind = members(effects, Effect)[name]
+    effect = kind(kind="probing") if name == "periodic" else kind()
+    amounts = {f"effects.{name}.{k}": v for k, v in values.items()}
+    with pytest.raises(InputError, match=f"effect {name} can't be tabulated.*--direct"):
+        refuse(made.matter(effect, **amounts), made.SMALL, [0.0, 0.0])
+    refuse(made.matter(effect), made.SMALL, [0.0, 0.0])  # at its neutral value it is no matter
+
+
+def test_a_failed_site_says_place_and_depth(monkeypatch):
+    from tissuejax.errors import NotConverged
+
+    monkeypatch.setattr(ramps, "MOST", 25)
+    with pytest.raises(NotConverged, match=r"place \(1.0, 2.0\) mm, depth"):
+        ramps.ramp(made.matter(), made.SMALL, [1e-3, 2e-3], 0.018, [1e-3])

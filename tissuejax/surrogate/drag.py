@@ -1,0 +1,72 @@
+"""Friction and adhesion of the ball on top of a surrogate's force.
+
+Friction: one tangential spring between ball and tissue that slides at the Coulomb limit. Its stiffness is the tissue's
+own against a sideways pull, 2 (1 - nu) / (2 - nu) = 2/3 of the normal one (Mindlin 1949, incompressible), in series
+with what `give` says. When the spring stiffens it keeps its force, when it softens its length: it never gains energy.
+
+Adhesion: bonds over the ring that has been touched pull back, sigma (g / reach) exp(1 - g / reach) at gap g. Around a
+ball (Derjaguin 1934) the ring sums up to 2 pi R times the integral of that over the gaps present, from the smallest
+to half of what the ball has been lifted since its deepest; bonds are gone five reaches away.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+MINDLIN = 2 / 3
+BREAK = 5.0  # gap over reach at which a bond is gone, as in `tled/contact.py`
+
+
+class Rub(eqx.Module):
+    """Coulomb coefficient and give (m/Pa); strength (Pa) and reach (m) of adhesion; zero for none."""
+
+    friction: Float[Array, ""]
+    give: Float[Array, ""]
+    strength: Float[Array, ""]
+    reach: Float[Array, ""]
+
+
+class Grip(NamedTuple):
+    """Stretch of the tangential spring, m, its stiffness, N/m, where the ball was, m; the deepest since it last let
+    go, m (minus one where nothing is bonded)."""
+
+    stretch: Float[Array, "2"]
+    stiffness: Float[Array, ""]
+    at: Float[Array, "2"]
+    deepest: Float[Array, ""]
+
+
+def start(at: Float[Array, "2"]) -> Grip:
+    """Untouched, the ball above `at`."""
+    return Grip(jnp.zeros(2), jnp.zeros(()), jnp.asarray(at), -jnp.ones(()))
+
+
+def pull(gap: Float[Array, ""], reach: Float[Array, ""]) -> Float[Array, ""]:
+    """Integral of (g / reach) exp(1 - g / reach) from 0 to gap, m."""
+    g = jnp.clip(gap / reach, 0.0, BREAK)
+    return reach * (jnp.e - (1 + g) * jnp.exp(1 - g))
+
+
+def tick(rub: Rub, grip: Grip, at, depth, normal, stiffness, radius) -> tuple[Float[Array, "3"], Grip]:
+    """Force of friction and adhesion on the ball, N, and the memory."""
+    touching = depth > 0
+    deepest = jnp.where(touching, jnp.maximum(grip.deepest, depth), grip.deepest)
+    near = jnp.maximum(-depth, 0.0)
+    far = jnp.where(deepest >= 0, near + jnp.maximum(deepest - jnp.maximum(depth, 0.0), 0.0) / 2, near)
+    bonds = jnp.where(deepest >= 0, pull(far, rub.reach) - pull(near, rub.reach), 0.0)
+    adhesion = -2 * jnp.pi * radius * rub.strength * bonds
+    deepest = jnp.where(near > BREAK * rub.reach, -1.0, deepest)
+
+    area = jnp.pi * radius * jnp.maximum(depth, 1e-9)
+    k = MINDLIN * stiffness
+    k = k / (1 + k * rub.give / area)
+    keep = jnp.where(k > grip.stiffness, grip.stiffness / jnp.where(k > 0, k, 1.0), 1.0)
+    stretch = grip.stretch * keep + at - grip.at
+    length = jnp.sqrt(jnp.sum(stretch**2) + 1e-30)
+    limit = rub.friction * jnp.maximum(normal, 0.0)
+    slid = jnp.minimum(1.0, limit / jnp.maximum(k * length, 1e-30))
+    stretch = jnp.where(touching & (k > 0), slid * stretch, 0.0)
+    force = jnp.append(-k * stretch, adhesion)
+    return force, Grip(stretch, k, at, deepest)

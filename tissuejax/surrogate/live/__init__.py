@@ -1,0 +1,1 @@
+"""Asking a surrogate, or the full model, step by step while the user's hand moves."""

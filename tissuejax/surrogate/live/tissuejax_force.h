@@ -1,0 +1,314 @@
+/* tissuejax_force.h: the force of tissue on a ball, from a file made by `tissuejax play MODEL --export FILE.tjf`.
+ *
+ * C99, no dependency but the C library, one header. tj_open allocates once; tj_force, tj_guard allocate nothing, take a
+ * few microseconds, and may be called from a haptic thread (CHAI3D, OpenHaptics HDAPI, or a loop of your own):
+ *
+ *     tj_model *model = tj_open("organ.tjf");            NULL: tj_fault() says why
+ *     tj_state state; tj_rest(model, &state);
+ *     tj_guard guard; tj_guard_start(&guard, 3.0, 300.0, 0.5);      3 N, 300 N/s, half a second of ramp-in
+ *     each tick:  tj_force(model, &state, position, dt, force);     metres, seconds, newtons
+ *                 tj_safe(&guard, position, age, dt, force);        limits; zero for stale or bad positions
+ *     tj_close(model);
+ *
+ * Frame: z up, the ball presses down along -z. `force` is that of the tissue on the ball.
+ * Define TJ_IMPLEMENTATION in one source file before including it, or TJ_STATIC for static functions.
+ */
+#ifndef TISSUEJAX_FORCE_H
+#define TISSUEJAX_FORCE_H
+#include <stddef.h>
+
+#define TJ_MODES 64 /* stress modes at most */
+#define TJ_TERMS 8  /* Prony terms at most */
+
+#if defined(TJ_STATIC)
+#define TJ_API static
+#define TJ_IMPLEMENTATION
+#elif !defined(TJ_API)
+#define TJ_API
+#endif
+
+typedef struct tj_model tj_model;
+
+/* What the tissue remembers; a plain value that may be copied. */
+typedef struct {
+    double gone[TJ_TERMS][TJ_MODES], now[TJ_MODES]; /* stress modes relaxed, and as they are */
+    double stretch[2], stiffness, at[2], deepest;   /* friction and adhesion */
+    int started;
+    double depth;                                   /* of the last tick, below first contact, m */
+} tj_state;
+
+/* Limits on what a device is told. */
+typedef struct {
+    double most, slew, ramp; /* N, N/s, s until the full force is allowed */
+    double stale;            /* s: a position older than this gives zero force */
+    double last[3], since;
+    int limited;             /* what acted at the last tick: 1 force, 2 slew, 4 ramp, 8 stale or not finite */
+} tj_guard;
+
+TJ_API tj_model *tj_open(const char *path);
+TJ_API void tj_close(tj_model *model);
+TJ_API const char *tj_fault(void);
+TJ_API void tj_rest(const tj_model *model, tj_state *state);
+TJ_API void tj_force(const tj_model *model, tj_state *state, const double position[3], double dt, double force[3]);
+TJ_API void tj_guard_start(tj_guard *guard, double most, double slew, double ramp);
+TJ_API void tj_safe(tj_guard *guard, const double position[3], double age, double dt, double force[3]);
+/* Box and ball, m: low x, low y, high x, high y, greatest depth, radius, height of the centre at first contact in the
+ * middle. */
+TJ_API void tj_box(const tj_model *model, double box[7]);
+
+#ifdef TJ_IMPLEMENTATION
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct { double origin[3], per[3]; int n[3], m; double *c; } tj__table;
+struct tj_model {
+    double low[2], high[2], depth, radius, factor, friction, give, strength, reach;
+    int terms;
+    double g[TJ_TERMS], tau[TJ_TERMS];
+    tj__table touch, law, stress, strain;
+};
+
+static const char *tj__said = "";
+TJ_API const char *tj_fault(void) { return tj__said; }
+
+static int tj__read(FILE *f, void *to, size_t size) { return fread(to, 1, size, f) == size; }
+static int tj__table_in(FILE *f, tj__table *t, int axes) {
+    int32_t n[4];
+    size_t i, count = 1;
+    if (!tj__read(f, n, sizeof n)) return 0;
+    for (i = 0; i < 4; i++) if (n[i] < 1 || n[i] > 100000) return 0;
+    for (i = 0; i < 3; i++) { t->n[i] = n[i]; count *= (size_t)n[i]; }
+    for (i = 0; i < (size_t)axes; i++) if (n[i] < 4) return 0;
+    t->m = n[3];
+    if (axes == 2 && t->m != 1) return 0;
+    if (t->m > TJ_MODES || count > (size_t)1 << 26) return 0;
+    count *= (size_t)t->m;
+    if (!tj__read(f, t->origin, sizeof t->origin) || !tj__read(f, t->per, sizeof t->per)) return 0;
+    t->c = (double *)malloc(count * sizeof(double));
+    if (!t->c || !tj__read(f, t->c, count * sizeof(double))) return 0;
+    for (i = 0; i < count; i++) if (!isfinite(t->c[i])) return 0;
+    return 1;
+}
+
+TJ_API tj_model *tj_open(const char *path) {
+    char magic[8];
+    int32_t head[2];
+    double v[11];
+    int fine = 0;
+    FILE *f = fopen(path, "rb");
+    tj_model *model = (tj_model *)calloc(1, sizeof *model);
+    tj__said = "no such file";
+    if (f && model) {
+        tj__said = "not a tissuejax force file, or of another version";
+        if (tj__read(f, magic, 8) && !memcmp(magic, "TJFORCE1", 8) && tj__read(f, head, sizeof head) && head[0] >= 0
+            && head[0] <= TJ_TERMS) {
+            tj__said = "cut off or damaged";
+            model->terms = head[0];
+            fine = tj__read(f, v, sizeof v) && tj__read(f, model->g, sizeof model->g)
+                && tj__read(f, model->tau, sizeof model->tau) && tj__table_in(f, &model->touch, 2)
+                && tj__table_in(f, &model->law, 3);
+            if (fine && model->terms) fine = tj__table_in(f, &model->stress, 3) && tj__table_in(f, &model->strain, 3);
+        }
+    }
+    if (f) fclose(f);
+    if (!fine) { tj_close(model); return NULL; }
+    model->low[0] = v[0]; model->low[1] = v[1]; model->high[0] = v[2]; model->high[1] = v[3];
+    model->depth = v[4]; model->radius = v[5]; model->factor = v[6];
+    model->friction = v[7]; model->give = v[8]; model->strength = v[9]; model->reach = v[10];
+    tj__said = "";
+    return model;
+}
+
+TJ_API void tj_close(tj_model *model) {
+    if (!model) return;
+    free(model->touch.c); free(model->law.c); free(model->stress.c); free(model->strain.c); free(model);
+}
+
+TJ_API void tj_rest(const tj_model *model, tj_state *state) {
+    (void)model;
+    memset(state, 0, sizeof *state);
+    state->deepest = -1;
+    state->depth = -1;
+}
+
+static void tj__basis(double u, double per, double b[4], double d[4]) {
+    double v = 1 - u;
+    b[0] = v * v * v / 6; b[1] = ((3 * u - 6) * u * u + 4) / 6; b[2] = ((3 * v - 6) * v * v + 4) / 6; b[3] = u * u * u / 6;
+    d[0] = -v * v / 2 * per; d[1] = (3 * u - 4) * u / 2 * per; d[2] = -(3 * v - 4) * v / 2 * per; d[3] = u * u / 2 * per;
+}
+
+/* Rows of values: value, d/dx, d/dy, d/ds, d2/dxds, d2/dyds, as many as asked for. */
+static void tj__ask(const tj__table *t, int axes, int rows, const double at[3], double out[6][TJ_MODES]) {
+    double b[3][4], d[3][4];
+    int first[3] = {0, 0, 0}, i, j, l, m, a, M = t->m, deep = axes == 3 ? 4 : 1;
+    for (a = 0; a < axes; a++) {
+        double x = (at[a] - t->origin[a]) * t->per[a];
+        int k = (int)floor(x);
+        k = k < 0 ? 0 : k > t->n[a] - 4 ? t->n[a] - 4 : k;
+        first[a] = k;
+        tj__basis(x - k, t->per[a], b[a], d[a]);
+    }
+    if (axes == 2) { b[2][0] = 1; d[2][0] = 0; }
+    if (M == 1) {
+        double r[6] = {0, 0, 0, 0, 0, 0};
+        for (i = 0; i < 4; i++)
+            for (j = 0; j < 4; j++) {
+                double p = 0, q = 0, v = b[0][i] * b[1][j], vx = d[0][i] * b[1][j], vy = b[0][i] * d[1][j];
+                const double *c = t->c + ((size_t)(first[0] + i) * t->n[1] + first[1] + j) * t->n[2] + first[2];
+                for (l = 0; l < deep; l++) { p += b[2][l] * c[l]; q += d[2][l] * c[l]; }
+                r[0] += v * p; r[1] += vx * p; r[2] += vy * p; r[3] += v * q; r[4] += vx * q; r[5] += vy * q;
+            }
+        for (i = 0; i < rows; i++) out[i][0] = r[i];
+        return;
+    }
+    for (i = 0; i < rows; i++) memset(out[i], 0, (size_t)M * sizeof(double));
+    for (i = 0; i < 4; i++)
+        for (j = 0; j < 4; j++) {
+            double v = b[0][i] * b[1][j], vx = d[0][i] * b[1][j], vy = b[0][i] * d[1][j];
+            const double *c = t->c + (((size_t)(first[0] + i) * t->n[1] + first[1] + j) * t->n[2] + first[2]) * M;
+            for (l = 0; l < deep; l++, c += M) {
+                double p = v * b[2][l], px = vx * b[2][l], py = vy * b[2][l], q = v * d[2][l];
+                if (rows == 1) for (m = 0; m < M; m++) out[0][m] += p * c[m];
+                else for (m = 0; m < M; m++) {
+                    out[0][m] += p * c[m]; out[1][m] += px * c[m]; out[2][m] += py * c[m]; out[3][m] += q * c[m];
+                }
+            }
+        }
+}
+
+static double tj__clip(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
+static double tj__pull(double gap, double reach) {
+    double g = tj__clip(gap / reach, 0, 5);
+    return reach * (2.718281828459045 - (1 + g) * exp(1 - g));
+}
+
+static void tj__rub(const tj_model *m, tj_state *s, const double p[3], double depth, double stiff, double fade, double f[3]) {
+    double normal = f[2] > 0 ? f[2] : 0, extra[3] = {0, 0, 0};
+    if (m->strength > 0) {
+        double near = depth < 0 ? -depth : 0, in = depth > 0 ? depth : 0;
+        if (depth > 0 && depth > s->deepest) s->deepest = depth;
+        if (s->deepest >= 0) {
+            double bonds = tj__pull(near + (s->deepest - in) / 2, m->reach) - tj__pull(near, m->reach);
+            extra[2] = -6.283185307179586 * m->radius * m->strength * bonds;
+        }
+        if (near > 5 * m->reach) s->deepest = -1;
+    }
+    if (m->friction > 0) {
+        double k = 2.0 / 3 * stiff, keep, x, y, length, slid;
+        k = k / (1 + k * m->give / (3.141592653589793 * m->radius * (depth > 1e-9 ? depth : 1e-9)));
+        keep = k > s->stiffness ? s->stiffness / k : 1;
+        x = s->stretch[0] * keep + p[0] - s->at[0];
+        y = s->stretch[1] * keep + p[1] - s->at[1];
+        length = k * sqrt(x * x + y * y + 1e-30);
+        slid = m->friction * normal / (length > 1e-30 ? length : 1e-30);
+        if (slid > 1) slid = 1;
+        if (!(depth > 0 && k > 0)) slid = 0;
+        s->stretch[0] = slid * x; s->stretch[1] = slid * y; s->stiffness = k;
+        extra[0] = -k * s->stretch[0]; extra[1] = -k * s->stretch[1];
+    }
+    s->at[0] = p[0]; s->at[1] = p[1];
+    f[0] += fade * extra[0]; f[1] += fade * extra[1]; f[2] += fade * extra[2];
+}
+
+TJ_API void tj_force(const tj_model *m, tj_state *state, const double p[3], double dt, double f[3]) {
+    double at[3], t[6][TJ_MODES], z[3], beyond[2], r, fade = 1, slide[2] = {0, 0}, depth, inside, below, s, stiff = 0, D = m->depth;
+    double free_[2];
+    int a, k, i;
+    f[0] = f[1] = f[2] = 0;
+    if (!(isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]) && isfinite(dt)) || dt < 0) return;
+    if (!state->started) { state->started = 1; state->at[0] = p[0]; state->at[1] = p[1]; }
+    for (a = 0; a < 2; a++) {
+        at[a] = tj__clip(p[a], m->low[a], m->high[a]);
+        beyond[a] = p[a] - at[a];
+        free_[a] = beyond[a] == 0 ? 1 : 0;
+    }
+    tj__ask(&m->touch, 2, 3, at, t);
+    for (a = 0; a < 3; a++) z[a] = t[a][0];
+    state->depth = depth = z[0] - p[2];
+    inside = tj__clip(depth, 0, D); below = depth > D ? depth - D : 0;
+    at[2] = s = sqrt(inside / D);
+    r = sqrt(beyond[0] * beyond[0] + beyond[1] * beyond[1]) / 1e-3;
+    if (r >= 1) fade = 0;
+    else if (r > 0) {
+        fade = 1 - r * r * r * (10 - 15 * r + 6 * r * r);
+        for (a = 0; a < 2; a++) slide[a] = -30 * r * (1 - r) * (1 - r) * beyond[a] / 1e-6;
+    }
+    if (depth > 0) {
+        double d15 = D * sqrt(D), s5 = s * s * s * s * s, up, energy;
+        tj__ask(&m->law, 3, 6, at, t);
+        up = m->factor * d15 * s * s * s * (5 * t[0][0] + s * t[3][0]) / 2;
+        energy = m->factor * d15 * D * s5 * t[0][0] + below * up;
+        for (a = 0; a < 2; a++) {
+            double aside = m->factor * (d15 * D * s5 * t[1 + a][0] + below * d15 * (5 * t[1 + a][0] + t[4 + a][0]) / 2);
+            f[a] = -fade * free_[a] * (aside + up * z[1 + a]) - slide[a] * energy;
+        }
+        f[2] = fade * up;
+        stiff = 1.5 * up / (inside > 1e-9 ? inside : 1e-9);
+    }
+    if (m->terms) {
+        double load[TJ_MODES] = {0};
+        int M = m->stress.m;
+        tj__ask(&m->stress, 3, 1, at, t);
+        for (k = 0; k < m->terms; k++) {
+            double h = dt / m->tau[k], decay = exp(-h), ramp = 1 - (h > 1e-4 ? -expm1(-h) / h : 1 - h / 2), *q = state->gone[k];
+            for (i = 0; i < M; i++) {
+                q[i] = decay * q[i] + (1 - decay) * state->now[i] + ramp * (m->factor * inside * t[0][i] - state->now[i]);
+                load[i] += m->g[k] * q[i];
+            }
+        }
+        for (i = 0; i < M; i++) state->now[i] = m->factor * inside * t[0][i];
+        if (depth > 0) {
+            double le = 0, lx = 0, ly = 0, ls = 0, deeper;
+            tj__ask(&m->strain, 3, 4, at, t);
+            for (i = 0; i < M; i++) { le += load[i] * t[0][i]; lx += load[i] * t[1][i]; ly += load[i] * t[2][i]; ls += load[i] * t[3][i]; }
+            deeper = le + ls * s / 2;
+            f[0] += fade * free_[0] * (inside * lx + deeper * z[1]) + slide[0] * inside * le;
+            f[1] += fade * free_[1] * (inside * ly + deeper * z[2]) + slide[1] * inside * le;
+            f[2] -= fade * deeper;
+        }
+        if (!(f[2] > 0)) f[0] = f[1] = f[2] = 0;
+    }
+    tj__rub(m, state, p, depth, stiff, fade, f);
+}
+
+TJ_API void tj_box(const tj_model *m, double box[7]) {
+    double at[3], t[6][TJ_MODES];
+    int a;
+    for (a = 0; a < 2; a++) { box[a] = m->low[a]; box[2 + a] = m->high[a]; at[a] = (m->low[a] + m->high[a]) / 2; }
+    tj__ask(&m->touch, 2, 3, at, t);
+    box[4] = m->depth; box[5] = m->radius; box[6] = t[0][0];
+}
+
+TJ_API void tj_guard_start(tj_guard *g, double most, double slew, double ramp) {
+    memset(g, 0, sizeof *g);
+    g->most = most; g->slew = slew; g->ramp = ramp; g->stale = 0.01;
+}
+
+TJ_API void tj_safe(tj_guard *g, const double p[3], double age, double dt, double f[3]) {
+    double size, share, step[3], change;
+    int a, bad = !(age >= 0 && age <= g->stale) || !(dt >= 0);
+    g->limited = 0;
+    for (a = 0; a < 3; a++) bad |= !isfinite(p[a]) || !isfinite(f[a]);
+    if (bad) { /* at once: a force that nobody answers for is taken away without a ramp, and comes back with one */
+        g->limited = 8; g->since = 0;
+        for (a = 0; a < 3; a++) f[a] = g->last[a] = 0;
+        return;
+    }
+    g->since += dt;
+    share = g->ramp > 0 && g->since < g->ramp ? g->since / g->ramp : 1;
+    if (share < 1) g->limited |= 4;
+    size = share * sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+    if (size > g->most) { share *= g->most / size; g->limited |= 1; }
+    for (a = 0, change = 0; a < 3; a++) { f[a] *= share; step[a] = f[a] - g->last[a]; change += step[a] * step[a]; }
+    change = sqrt(change);
+    if (change > g->slew * dt) {
+        for (a = 0; a < 3; a++) f[a] = g->last[a] + step[a] * g->slew * dt / change;
+        g->limited |= 2;
+    }
+    for (a = 0; a < 3; a++) g->last[a] = f[a];
+}
+#endif /* TJ_IMPLEMENTATION */
+#endif

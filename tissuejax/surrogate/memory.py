@@ -1,0 +1,88 @@
+"""Relaxation by a memory of stress: isochoric stress over the organ in few modes, each with the material's Prony terms.
+
+A memory of the force is wrong by 5 to 9 % of the peak in a drag, since the tissue under the new place has not relaxed.
+The material says S = S_e - sum_k g_k q_k with dq_k/dt = (S_e - q_k) / tau_k at every point. With S_e(p) = sum_m b_m(p)
+phi_m on a fixed grid of material points, q_k has the same modes; and by virtual work over the strains E(p) that the
+ball makes, the force on the ball is F = -dW/dp + sum_k g_k sum_m q_km de_m/dp, e_m(p) = int phi_m : E(p) dV.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+from scipy.interpolate import RegularGridInterpolator
+
+from tissuejax.mesh.columns import Lobe
+from tissuejax.mesh.quality import cell_volumes
+from tissuejax.surrogate.modes import Modes, modes
+from tissuejax.surrogate.places import Box
+from tissuejax.surrogate.ramp import Ramp
+from tissuejax.surrogate.site_mesh import CORE, PER_RADIUS, Grid, lines, nodes
+
+TOLERANCE, MOST = 0.01, 64
+DOUBLE = np.array([1.0, 1, 1, 2, 2, 2])  # off-diagonal components count twice in S : E
+POINTS = 26  # material cells along an axis at most
+
+
+class Material(NamedTuple):
+    """Points fixed in the material: parameters s, t and height share of their centres on a grid, and cell volumes."""
+
+    axes: tuple[Float[np.ndarray, " a"], ...]
+    volume: Float[np.ndarray, " n"]
+
+
+def material(lobe: Lobe, box: Box, grid: Grid) -> Material:
+    """A fixed grid, fine wherever the ball may come, coarse beyond."""
+    core, finest, found = max(CORE, PER_RADIUS * grid.radius), 1.6e-3, []
+    middle = lobe.parameters_of((box.low + box.high) / 2)
+    for axis in range(2):
+        ends = [(box.low[axis], box.high[axis])[k] for k in (0, 1)]
+        place = (box.low + box.high) / 2
+        q = []
+        for end in ends:
+            place[axis] = end
+            q.append(lobe.parameters_of(place)[axis])
+        metric = np.hypot(*(float(f.ev(*middle, dx=1 - axis, dy=axis)) for f in (lobe.x, lobe.y)))
+        low, high = max(0.02, min(q) - core / metric), min(0.98, max(q) + core / metric)
+        count = min(POINTS - 6, int(np.ceil((high - low) * metric / finest)))
+        fine = np.linspace(low, high, count + 1)
+        found.append(np.concatenate([np.linspace(0, low, 4)[:-1], fine, np.linspace(high, 1, 4)[1:]]))
+    s, t = found
+    corners = nodes(lobe, s, t, grid.counts[2])
+    index = np.arange(corners[..., 0].size).reshape(corners.shape[:3])
+    ring = lambda m: [m[:-1, :-1], m[1:, :-1], m[1:, 1:], m[:-1, 1:]]  # noqa: E731
+    cells = np.stack([v.ravel() for v in (*ring(index[:, :, :-1]), *ring(index[:, :, 1:]))], 1)
+    volume = cell_volumes(corners.reshape(-1, 3), cells, "hexahedron")
+    heights = np.linspace(0, 1, grid.counts[2] + 1)
+    return Material(tuple((a[1:] + a[:-1]) / 2 for a in (s, t, heights)), volume)
+
+
+def read_off(material: Material, lobe: Lobe, grid: Grid, place, fields: Float[np.ndarray, "k E 6"]):
+    """Fields at the centres of a site's elements, (k, E, 6), at the material points, (k, n, 6)."""
+    s, t = lines(lobe, place, grid)
+    own = [(a[1:] + a[:-1]) / 2 for a in (s, t, np.linspace(0, 1, grid.counts[2] + 1))]
+    values = np.moveaxis(fields.reshape(len(fields), *grid.counts, 6), 0, -1)
+    wanted = np.stack(np.meshgrid(*material.axes, indexing="ij"), -1).reshape(-1, 3)
+    inside = np.clip(wanted, [a[0] for a in own], [a[-1] for a in own])
+    return np.moveaxis(RegularGridInterpolator(own, values)(inside), -1, 0)
+
+
+class Projected(NamedTuple):
+    """b (k, M): coefficients of the stress, Pa sqrt(m^3); e (k, M): of the strain, sqrt(m^3); and the modes."""
+
+    stress: Float[np.ndarray, "k M"]
+    strain: Float[np.ndarray, "k M"]
+    modes: Modes
+
+
+def projected(material: Material, lobe: Lobe, grid: Grid, ramps: Sequence[Ramp], tolerance: float = TOLERANCE):
+    """All states of all ramps in stress modes."""
+    metric = (material.volume[:, None] * DOUBLE).ravel()
+    read = lambda name: np.concatenate(  # noqa: E731
+        [read_off(material, lobe, grid, r.place, getattr(r, name)).reshape(len(r.depth), -1) for r in ramps]
+    )
+    stress, strain = read("stress"), read("strain")
+    found = modes(stress, tolerance, MOST, metric)
+    weighted = found.shapes * metric
+    return Projected(stress @ weighted.T, strain @ weighted.T, found)
