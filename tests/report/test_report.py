@@ -51,6 +51,8 @@ def test_quantities_are_shown_in_readable_units(unit, size, expected):
         (1234.5, 56.0, "1234 ± 56"),
         (2.5, None, "2.5"),
         (2.5, np.inf, "2.5 (not identified)"),
+        (33.21, 217.0, "33.21 ± 217"),
+        (0.3500123, 0.0000042, "0.3500123 ± 0.0000042"),
     ],
 )
 def test_values_carry_two_digits_of_their_error(value, std, text):
@@ -99,7 +101,8 @@ def test_the_page_stands_alone_and_says_what_matters(found, tmp_path):
     written = write_fit(found, tmp_path)
     page = written["page"].read_text()
     assert not re.search(r'(src|href)="(?!data:)', page), "the page points outside itself"
-    assert page.count("data:image/png;base64,") == len(written) - 2
+    assert page.count("data:image/png;base64,") == sum(path.suffix == ".png" for path in written.values())
+    assert {p.suffix for p in (tmp_path / "print").iterdir()} == {".svg", ".pdf"}
     for words in ("as well as the noise allows", "held out", "energy.C10", "What to do next", "619.9 ± 0.5"):
         assert words in page or words == "619.9 ± 0.5"
     assert sentences.table(found)[0]["value"] in page

@@ -7,6 +7,7 @@ from typing import ClassVar
 from tissuejax import verbs
 from tissuejax.commands.arguments import add_fit, add_model, fit_options
 from tissuejax.commands.command import Command, Reply
+from tissuejax.fitting.advice import suspect
 from tissuejax.fitting.result import Fit
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read, read_all
@@ -97,12 +98,20 @@ written all the same, with a warning on top).
 
 def reply(found: Fit, written: dict[str, Path]) -> Reply:
     """The answer to a fit: the record, and the main numbers as text."""
+    doubts = suspect(found)
     lines = [sentences.summary(found), ""]
-    lines += [f"  {row['path']:<28}{row['value']:>24} {row['unit']:<6}{row['note']}" for row in sentences.table(found)]
+    lines += [f"DON'T USE THESE NUMBERS AS THEY ARE: {'; '.join(doubts)}.", ""] if doubts else []
+    lines += [
+        f"  {row['path']:<34} {row['value']:>26} {row['unit']:<6}{row['note'] or row['interval']}"
+        for row in sentences.table(found)
+    ]
     lines.append("")
     lines += [f"  {e['key']:<40}{e['kind']:<10}RMSE {e['rmse']:<12}R2 {e['r2']}" for e in sentences.errors(found)[:40]]
     lines += ["", *(f"  ! {warning}" for warning in found.warnings)] if found.warnings else []
     lines += ["", f"page     {written['page']}", f"numbers  {written['result']}"]
-    lines.append(f"figures  {', '.join(str(p) for n, p in written.items() if n not in ('page', 'result'))}")
-    record = found.record() | {"files": {name: str(path) for name, path in written.items()}}
+    lines.append(
+        f"figures  {', '.join(str(p) for p in written.values() if p.suffix == '.png')}; print/ has SVG and PDF"
+    )
+    lines.append(f"data     {written['curves']}, {written['table']}")
+    record = found.record() | {"suspect": doubts, "files": {name: str(path) for name, path in written.items()}}
     return Reply(record, "\n".join(lines), 0 if found.converged else 3)

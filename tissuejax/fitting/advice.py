@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 MISFIT = 1.5  # chi-square per sample from which the misfit is called larger than the noise
 SERIAL = 0.5  # lag-one correlation of residuals from which standard errors are called optimistic
 CONDITION = 1e6
+GROSS = 5.0  # misfit in units of the noise beyond which a fit describes something else
 
 
 def warnings_of(found: "Fit") -> list[str]:
@@ -43,10 +44,29 @@ def warnings_of(found: "Fit") -> list[str]:
     return said + _starts(found)
 
 
-def _misfit(found: "Fit") -> list[str]:
+def beyond_noise(found: "Fit") -> dict[str, float]:
+    """Channels whose misfit exceeds the recorded noise, and how many times: the one test of "something is missing".
+
+    A noise level estimated from few samples may be a quarter too low, hence the margin of `MISFIT`.
+    """
     groups = found.problem.noise.groups
-    bad = {k: math.sqrt(s.chi2_per_sample) for k, s in found.channels.items() if k not in groups}
-    bad = {k: times for k, times in bad.items() if times**2 > MISFIT}
+    times = {k: math.sqrt(s.chi2_per_sample) for k, s in found.channels.items() if k not in groups}
+    return {k: t for k, t in times.items() if t**2 > MISFIT}
+
+
+def suspect(found: "Fit") -> list[str]:
+    """Why the numbers should not be used as they are: a bound, an unstable law, a misfit of several times the noise."""
+    said = [f"{path} ended at its {side} bound" for path, side in found.at_bound.items()]
+    if sentence(found.stability):
+        said.append("the fitted energy is unstable inside the recorded range")
+    worst = max(beyond_noise(found).values(), default=0.0)
+    if worst > GROSS:
+        said.append(f"the misfit is {worst:.3g} times the noise")
+    return said
+
+
+def _misfit(found: "Fit") -> list[str]:
+    bad = beyond_noise(found)
     if not bad:
         return []
     worst = sorted(bad, key=bad.get, reverse=True)

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 
 from tissuejax.fitting.result import Fit
-from tissuejax.report.plot import INK, MODEL, PAPER, Plot, tidy
+from tissuejax.report.plot import FAINT, INK, MODEL, PAPER, Plot, tidy
 
 CAP = 100.0  # per cent; beyond, the bar is cut and marked
 
@@ -35,7 +35,7 @@ class Estimates(Plot):
         value = np.array([abs(subject.values[path]) for path in subject.free])
         std = np.array([subject.std[path] for path in subject.free])
         with np.errstate(divide="ignore", invalid="ignore"):
-            relative = np.where(np.isfinite(std), 100 * std / value, np.inf)
+            relative = np.where(np.isfinite(std) & (value > 0), 100 * std / value, np.inf)
         return Spread(labels, relative, np.nan_to_num(subject.correlation))
 
     def caption(self, data: Spread) -> str:
@@ -50,21 +50,29 @@ class Estimates(Plot):
     def draw(self, data: Spread) -> Figure:
         """Bars beside a matrix."""
         p = len(data.labels)
-        figure = Figure(figsize=(10, max(2.6, 0.42 * p + 1.4)), layout="constrained", facecolor=PAPER)
-        bars, matrix = figure.subplots(1, 2, gridspec_kw={"width_ratios": [1.2, 1]})
+        wide = 0.085 * max(map(len, data.labels)) + 0.3
+        figure = Figure(
+            figsize=(9 + wide, max(2.8, 0.42 * p + 1.2 + 0.5 * wide)), layout="constrained", facecolor=PAPER
+        )
+        bars, matrix = figure.subplots(1, 2, gridspec_kw={"width_ratios": [1.0, 1.0]})
         tidy(bars)
         rows = np.arange(p)
-        bars.barh(rows, np.minimum(data.relative, CAP), color=MODEL, height=0.55)
-        for row, value in zip(rows, data.relative, strict=True):
-            text = "not identified" if not np.isfinite(value) else f"{value:.2g} %"
-            bars.text(min(value, CAP), row, f" {text}", va="center", fontsize=8, color=INK)
+        open_ended = ~np.isfinite(data.relative) | (data.relative > CAP)
+        shown = np.where(open_ended, CAP, np.nan_to_num(data.relative))
+        most = float(max(shown, default=CAP)) or 1.0
+        bars.barh(rows, shown, color=[FAINT if o else MODEL for o in open_ended], height=0.55)
+        for row, value, size in zip(rows, data.relative, shown, strict=True):
+            text = (
+                "not identified" if not np.isfinite(value) else f"{value:.2g} %" if value <= CAP else f"> {CAP:.0f} %"
+            )
+            bars.text(size + 0.01 * most, row, text, va="center", fontsize=8, color=INK)
         bars.set_yticks(rows, data.labels)
-        bars.set_xlim(0, 1.35 * min(CAP, max(data.relative[np.isfinite(data.relative)], default=CAP)) or 1)
-        bars.invert_yaxis()
+        bars.set_xlim(0, 1.45 * most)
+        bars.set_ylim(p - 0.5, -0.5)
         bars.set_xlabel("relative standard error (%)")
         image = matrix.imshow(data.correlation, cmap="RdBu_r", vmin=-1, vmax=1)
-        matrix.set_xticks(rows, data.labels, rotation=45, ha="right", fontsize=8)
-        matrix.set_yticks(rows, data.labels, fontsize=8)
+        matrix.set_xticks(rows, data.labels, rotation=90, fontsize=8)
+        matrix.set_yticks(rows, [""] * p)  # the rows of the bars
         for i in range(p):
             for j in range(p):
                 value = data.correlation[i, j]

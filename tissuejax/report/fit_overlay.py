@@ -1,17 +1,40 @@
-"""Measured points and the fitted curve, one panel a recording and channel."""
+"""Measured points, the fitted model with its band, the model with effects off: over what was done and over time."""
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from jaxtyping import Float
 from matplotlib.figure import Figure
 
+from tissuejax.fitting.bands import NORMAL_95, prediction_std
 from tissuejax.fitting.result import Fit
-from tissuejax.report.plot import HELD, INK, MEASURED, MODEL, Plot, grid
+from tissuejax.report.plot import FAINT, HELD, INK, MEASURED, MODEL, Plot, grid
 from tissuejax.report.scales import display, label
-from tissuejax.report.series import Curve, curves
+from tissuejax.report.series import Curve, curves, curves_of
 
-MOST = 12  # panels; more recordings than this are better read in the table
+MOST = 8  # series; more recordings than this are better read in the table
 DENSE = 400  # points drawn a panel
+
+
+@dataclass(frozen=True)
+class Shown:
+    """One series of a fit.
+
+    Attributes:
+        curve: measured and predicted.
+        band: half width of the 95 % band of a measured value (estimates and noise), or None.
+        bare: the same model with every effect off, or None where there is no effect.
+    """
+
+    curve: Curve
+    band: Float[np.ndarray, " n"] | None
+    bare: Float[np.ndarray, " n"] | None
+
+    @property
+    def recording(self) -> str:
+        """Its name."""
+        return self.curve.recording
 
 
 class FitOverlay(Plot):
@@ -21,27 +44,63 @@ class FitOverlay(Plot):
     subject: ClassVar[type] = Fit
     order: ClassVar[int] = 10
 
-    def prepare(self, subject: Fit) -> list[Curve]:
-        """The first panels, held-out recordings always among them."""
-        found = curves(subject)
-        held = [c for c in found if c.held]
-        return [c for c in found if not c.held][: MOST - min(len(held), MOST // 2)] + held[: MOST // 2]
+    def prepare(self, subject: Fit) -> list[Shown]:
+        """The first series, held-out recordings always among them."""
+        found, bands, bare = curves(subject), _bands(subject), _bare(subject)
+        every = [Shown(c, bands.get((c.recording, c.channel)), bare.get((c.recording, c.channel))) for c in found]
+        held = [s for s in every if s.curve.held]
+        return [s for s in every if not s.curve.held][: MOST - min(len(held), MOST // 2)] + held[: MOST // 2]
 
-    def caption(self, data: list[Curve]) -> str:
+    def caption(self, data: list[Shown]) -> str:
         """What the colours mean."""
-        held = " Orange: recordings that took no part in the fit." if any(c.held for c in data) else ""
-        return f"Measured (grey) and fitted model (blue), {len(data)} series.{held}"
+        text = f"Measured and fitted, {len(data)} series, over what was done and over time."
+        if any(s.band is not None for s in data):
+            text += " Band: where 95 % of measured values should lie, from the estimates' errors and the noise."
+        if any(s.bare is not None for s in data):
+            text += " Dashed: the same energy with every effect off, not refitted."
+        return text + (" Orange: recordings that took no part in the fit." if any(s.curve.held for s in data) else "")
 
-    def draw(self, data: list[Curve]) -> Figure:
-        """Against stretch or shear; against time where the drive rests."""
-        figure, axes = grid(len(data))
-        for ax, curve in zip(axes, data, strict=True):
-            draw_curve(ax, curve)
+    def draw(self, data: list[Shown]) -> Figure:
+        """A row a series: left over stretch or shear where there is one, right over time."""
+        both = any(s.curve.drive is not None for s in data)
+        figure, axes = grid(len(data) * (2 if both else 1), columns=2, height=2.5)
+        panels = iter(axes)
+        for shown in data:
+            if both and shown.curve.drive is not None:
+                draw_shown(next(panels), shown, by_time=False)
+            elif both:
+                next(panels).set_visible(False)
+            draw_shown(next(panels), shown, by_time=True)
+        known = {}
+        for ax in axes:
+            for handle, text in zip(*ax.get_legend_handles_labels(), strict=True):
+                known.setdefault(text, handle)
+        columns = min(5, len(known))
+        figure.legend(known.values(), known, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)
         return figure
 
 
+def draw_shown(ax, shown: Shown, by_time: bool) -> None:
+    """One series on one axis, with band and bare model."""
+    curve = shown.curve
+    factor, unit = display(curve.unit, float(np.nanmax(np.abs(curve.measured), initial=0.0)))
+    x = curve.time if by_time else curve.drive
+    colour, kind = (HELD, "model, held out") if curve.held else (MODEL, "model")
+    thin = slice(None, None, max(1, len(x) // DENSE))
+    ax.plot(x[thin], curve.measured[thin] / factor, ".", color=MEASURED, markersize=2.6, zorder=4, label="measured")
+    if shown.bare is not None:
+        ax.plot(x, shown.bare / factor, "--", color=FAINT, linewidth=1.1, label="effects off")
+    if shown.band is not None and (by_time or curve.monotone):
+        low, high = ((curve.predicted + side * shown.band) / factor for side in (-1, 1))
+        ax.fill_between(x, low, high, color=colour, alpha=0.18, linewidth=0, label="95 % band")
+    ax.plot(x, curve.predicted / factor, color=colour, linewidth=1.6, alpha=0.9, label=kind)
+    ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontsize=9.5, color=INK)
+    ax.set_xlabel("time (s)" if by_time else curve.drive_name)
+    ax.set_ylabel(f"{curve.channel.replace('_', ' ')}{label(unit)}")
+
+
 def draw_curve(ax, curve: Curve) -> None:
-    """One series on one axis."""
+    """One series on one axis, against stretch or shear, or against time where the drive rests."""
     factor, unit = display(curve.unit, float(np.nanmax(np.abs(curve.measured), initial=0.0)))
     by_time = curve.drive is None or curve.held_still
     x = curve.time if by_time else curve.drive
@@ -52,3 +111,40 @@ def draw_curve(ax, curve: Curve) -> None:
     ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontsize=9.5, color=INK)
     ax.set_xlabel("time (s)" if by_time else curve.drive_name)
     ax.set_ylabel(f"{curve.channel.replace('_', ' ')}{label(unit)}")
+
+
+def _bands(found: Fit) -> dict[tuple[str, str], np.ndarray]:
+    """Half widths by (recording, channel label); of material tests only, since a probing's Jacobian takes minutes."""
+    problem = found.problem
+    if problem.predictor.name != "homogeneous":
+        return {}
+    spread = prediction_std(problem, found.values, found.uncertainty, tuple(found.predictions))
+    return {
+        key: NORMAL_95 * np.sqrt(values**2 + (level or 0.0) ** 2) for key, values, level in _labelled(found, spread)
+    }
+
+
+def _labelled(found: Fit, series):
+    """((recording, channel label), one column, noise level) of arrays by recording and channel."""
+    measured, std = found.problem.predictor.sample.recordings, found.problem.noise.std
+    for name, channels in series.items():
+        for curve in curves_of(measured[name], None, std):
+            for channel, values in channels.items():
+                stem, _, k = curve.channel.partition(" ")
+                if stem != channel:
+                    continue
+                column = values if np.ndim(values) == 1 else np.asarray(values)[:, int(k) - 1 if k.isdigit() else 0]
+                yield (name, curve.channel), np.asarray(column, float), curve.std
+
+
+def _bare(found: Fit) -> dict[tuple[str, str], np.ndarray]:
+    """Predictions with the amplitudes of all effects at zero, by (recording, channel label)."""
+    predictor = found.problem.predictor
+    model = predictor.model
+    if not model.effects or predictor.name != "homogeneous":
+        return {}
+    amplitudes = [f"effects.{e.name}.{a}" for e in model.effects for a in e.amplitudes]
+    off = {p: v for p, v in found.values.items() if not any(p == a or p.startswith(f"{a}.") for a in amplitudes)}
+    told = predictor.of(tuple(found.predictions)).predict(off)
+    series = {name: {c: np.asarray(ch.values) for c, ch in r.channels.items()} for name, r in told.items()}
+    return {key: values for key, values, _ in _labelled(found, series)}

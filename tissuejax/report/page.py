@@ -11,12 +11,15 @@ from matplotlib.figure import Figure
 
 from tissuejax import report as package
 from tissuejax.families import members
+from tissuejax.fitting.advice import suspect
 from tissuejax.fitting.result import Fit
 from tissuejax.report import sentences
+from tissuejax.report.fit_tables import write_curves, write_latex
 from tissuejax.report.plot import Plot
-from tissuejax.storage import write_bytes, write_json, write_text
+from tissuejax.storage import write_bytes, write_figure, write_json, write_text
 
-DPI = 100
+DPI = 130
+VECTOR = ("svg", "pdf")
 
 
 def plots(subject: Any) -> list[Plot]:
@@ -26,12 +29,13 @@ def plots(subject: Any) -> list[Plot]:
 
 
 def figures(subject: Any) -> list[dict[str, Any]]:
-    """Name, caption and PNG of every plot that has something to show."""
+    """Name, caption, PNG and the figure itself of every plot that has something to show."""
     found = []
     for plot in plots(subject):
         data = plot.prepare(subject)
         if data is not None:
-            found.append({"name": plot.name, "caption": plot.caption(data), "png": png(plot.draw(data))})
+            figure = plot.draw(data)
+            found.append({"name": plot.name, "caption": plot.caption(data), "png": png(figure), "figure": figure})
     return found
 
 
@@ -40,6 +44,15 @@ def png(figure: Figure) -> bytes:
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI)
     return buffer.getvalue()
+
+
+def printable(drawn: list[dict[str, Any]], out: Path) -> dict[str, Path]:
+    """The same figures as SVG and PDF, for papers, in the subfolder `print`."""
+    return {
+        f"{f['name']}.{kind}": write_figure(out / "print" / f"{f['name']}.{kind}", f["figure"])
+        for f in drawn
+        for kind in VECTOR
+    }
 
 
 def render(template: str, **content: Any) -> str:
@@ -51,7 +64,7 @@ def render(template: str, **content: Any) -> str:
 
 
 def write_fit(found: Fit, out: Path, pictures: bool = True) -> dict[str, Path]:
-    """result.json, report.html and one PNG a figure, each written whole or not at all.
+    """result.json, report.html, one PNG a figure, curves.csv, parameters.tex, and the figures as SVG and PDF.
 
     Args:
         found: the fit.
@@ -59,7 +72,7 @@ def write_fit(found: Fit, out: Path, pictures: bool = True) -> dict[str, Path]:
         pictures: False leaves figures and page out (many fits in a row).
 
     Returns:
-        Paths by name: "result", "page" and the figures.
+        Paths by name: "result", "page", "curves", "table", and the figures by name and by name and format.
     """
     written = {"result": write_json(out / "result.json", found.record())}
     if not pictures:
@@ -73,13 +86,16 @@ def write_fit(found: Fit, out: Path, pictures: bool = True) -> dict[str, Path]:
         record=found.record(),
         summary=sentences.summary(found),
         steps=sentences.next_steps(found),
+        suspect=suspect(found),
         parameters=sentences.table(found),
         errors=sentences.errors(found),
         sites=sentences.sites(found),
         figures=drawn,
     )
     written["page"] = write_text(out / "report.html", page)
-    return written
+    written["curves"] = write_curves(found, out / "curves.csv")
+    written["table"] = write_latex(found, out / "parameters.tex")
+    return written | printable(drawn, out)
 
 
 def write_figures(subject: Any, out: Path) -> Mapping[str, Path]:

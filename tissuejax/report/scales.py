@@ -17,17 +17,20 @@ def display(unit: str, size: float) -> tuple[float, str]:
 
 
 def with_std(value: float, std: float | None) -> str:
-    """`value` and its standard error with two digits of the error: 1.234 ± 0.056."""
+    """`value` with four digits or as many as its error has, and its standard error with two: 1.234 ± 0.056."""
     if std is None:
         return f"{value:.5g}"
     if not math.isfinite(std):
         return f"{value:.4g} (not identified)"
     if std <= 0 or std < 1e-9 * abs(value):
         return f"{value:.6g} ± 0"
-    digits = 1 - math.floor(math.log10(std))
-    if -4 <= digits <= 8:
-        return f"{value:.{max(0, digits)}f} ± {std:.{max(0, digits)}f}"
-    return f"{value:.4g} ± {std:.2g}"
+    own = 3 - math.floor(math.log10(abs(value))) if value else 0
+    theirs = 1 - math.floor(math.log10(std))
+    if max(own, theirs) > 8 or min(own, theirs) < -4:
+        return f"{value:.4g} ± {std:.2g}"
+    places = max(0, theirs, own if abs(value) > std else min(own, 4))
+    error = f"{std:.{places}f}" if places <= max(0, theirs) else f"{std:.{max(0, theirs)}f}"
+    return f"{value:.{places}f} ± {error}"
 
 
 def label(unit: str) -> str:

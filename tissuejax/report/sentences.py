@@ -3,6 +3,8 @@
 import math
 
 from tissuejax.energies.catalogue import name_of
+from tissuejax.fitting.advice import beyond_noise
+from tissuejax.fitting.bands import NORMAL_95
 from tissuejax.fitting.result import Fit
 from tissuejax.report.scales import display, with_std
 
@@ -31,12 +33,13 @@ def overall(found: Fit) -> str:
         return (
             f"The model leaves {_range(found.channels)}; the noise was not recorded, so this is all that can be said."
         )
-    ratio = found.chi2_per_dof
+    bad = beyond_noise(found)
     verdict = (
-        "as well as the noise allows"
-        if ratio < 1.3
-        else f"to within {math.sqrt(ratio):.1f} times the noise, so something is missing from the model"
+        f"to within {max(bad.values()):.1f} times the noise, so something is missing from the model"
+        if bad
+        else "as well as the noise allows"
     )
+    ratio = found.chi2_per_dof
     return f"It describes them {verdict} ({_range(found.channels)}, chi-square per degree of freedom {ratio:.3g})."
 
 
@@ -64,7 +67,7 @@ def next_steps(found: Fit) -> list[str]:
         said.append(
             "Start elsewhere (--start, --multistart 16), or fit fewer parameters (--fix), before trusting a number."
         )
-    misfit = not found.problem.noise.estimated and found.chi2_per_dof > 1.5
+    misfit = bool(beyond_noise(found))
     serial = max((s.autocorrelation for s in found.channels.values()), default=0.0) > 0.5
     if misfit or (serial and found.problem.noise.estimated):
         said.append(
@@ -91,26 +94,40 @@ def next_steps(found: Fit) -> list[str]:
 
 
 def table(found: Fit) -> list[dict[str, str]]:
-    """Rows of the parameter table, in readable units."""
+    """Rows of the parameter table: one unit a family, four digits, 95 % intervals, in words where nothing is known."""
     declared = found.problem.predictor.model.parameters
+    sizes: dict[str, list[float]] = {}
+    for path in found.free:
+        if found.values[path]:
+            sizes.setdefault(declared[path].unit, []).append(abs(found.values[path]))
+    common = {unit: display(unit, sorted(of)[len(of) // 2]) for unit, of in sizes.items()}
     rows = []
     for path, value in found.values.items():
+        factor, unit = common.get(declared[path].unit) or display(declared[path].unit, abs(value))
         std = found.std.get(path)
-        size = max(abs(value), std if std is not None and math.isfinite(std) else 0.0)
-        factor, unit = display(declared[path].unit, size)
-        shown = with_std(value / factor, None if std is None else std / factor)
+        known = std is not None and identified(value, std, declared[path].typical)
+        interval = ""
+        if known:
+            low, high = found.problem.bound(path)
+            ends = (max(low, value - NORMAL_95 * std), min(high, value + NORMAL_95 * std))
+            interval = " to ".join(f"{end / factor:.4g}" for end in ends)
         note = f"at its {found.at_bound[path]} bound" if path in found.at_bound else ""
-        note = note if path in found.free else "fixed"
         rows.append(
             {
                 "path": path,
-                "value": shown,
+                "value": with_std(value / factor, None if std is None else std / factor if known else math.inf),
+                "interval": interval,
                 "unit": "" if unit == "1" else unit,
                 "meaning": declared[path].meaning,
-                "note": note,
+                "note": note if path in found.free else "fixed",
             }
         )
     return rows
+
+
+def identified(value: float, std: float, typical: float) -> bool:
+    """Whether a standard error says anything: smaller than the value, or than what such a parameter usually is."""
+    return math.isfinite(std) and std <= max(abs(value), typical)
 
 
 def errors(found: Fit) -> list[dict[str, str]]:

@@ -1,0 +1,108 @@
+"""The page of a fit says one thing: band, digits, units and verdict, checked as data."""
+
+import csv
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import tissuejax as tj
+from tests.specimens import ramp, recording
+from tissuejax.fitting.advice import beyond_noise, suspect
+from tissuejax.recordings.recording import Channel, Recording, Sample
+from tissuejax.report import sentences
+from tissuejax.report.fit_overlay import FitOverlay
+from tissuejax.report.fit_tables import write_curves, write_latex
+from tissuejax.report.scales import with_std
+
+STRETCH = np.linspace(1.0, 1.4, 60)
+
+
+def sample(noise, mu=3000.0, seed=1, stated=None):
+    rng, time = np.random.default_rng(seed), np.arange(60.0)
+    made = recording("pull", "uniaxial", time, STRETCH)
+    stress = mu * (STRETCH - STRETCH**-2) + noise * rng.normal(size=60)
+    channel = Channel(time, stress, "Pa", stated or noise)
+    return Sample("s", {"pull": Recording("pull", "uniaxial", made.inputs, {"nominal_stress": channel}, {})})
+
+
+@pytest.fixture(scope="module")
+def found():
+    return tj.fit(sample(10.0), "neo-hookean", multistart=1)
+
+
+def test_the_band_is_that_of_a_line_through_the_origin(found):
+    # P = mu x, x = l - l^-2: var of the estimate s^2 / sum x^2, so the band of a measured value is by hand.
+    x = STRETCH - STRETCH**-2
+    widening = max(1.0, found.chi2_per_dof)
+    by_hand = 1.959964 * np.sqrt(100.0 * widening * x**2 / np.sum(x**2) + 100.0)
+    np.testing.assert_allclose(FitOverlay().prepare(found)[0].band, by_hand, rtol=1e-6)
+
+
+def test_a_noise_level_a_little_low_is_not_something_missing():
+    found = tj.fit(sample(5.0, stated=3.7), "neo-hookean", multistart=1)
+    assert 1.15 < found.chi2_per_dof < 1.5
+    assert not beyond_noise(found)
+    assert "as well as the noise allows" in sentences.overall(found)
+    assert not any("lack" in step for step in sentences.next_steps(found))
+    worse = tj.fit(sample(5.0, stated=2.5), "neo-hookean", multistart=1)
+    assert "something is missing" in sentences.overall(worse)
+    assert any("lacks" in step for step in sentences.next_steps(worse))
+    assert any("exceeds the noise" in w for w in worse.warnings)
+
+
+def test_gross_misfit_and_bounds_are_said_first():
+    found = tj.fit(sample(5.0, stated=0.5), "neo-hookean", multistart=1)
+    assert any("times the noise" in s for s in suspect(found))
+    held = tj.fit(sample(10.0), "neo-hookean", multistart=1, bounds={"energy.mu": (100.0, 2000.0)})
+    assert any("upper bound" in s for s in suspect(held))
+
+
+def test_what_is_not_known_is_said_in_words():
+    declared = SimpleNamespace(unit="Pa", typical=1000.0, meaning="")
+    fit = SimpleNamespace(
+        problem=SimpleNamespace(
+            predictor=SimpleNamespace(model=SimpleNamespace(parameters={p: declared for p in "abc"})),
+            bound=lambda path: (0.0, np.inf),
+        ),
+        free=("a", "b", "c"),
+        values={"a": 0.4, "b": 3456.7, "c": 2100.0},
+        std={"a": 7.4e10, "b": 12.0, "c": 900.0},
+        at_bound={},
+    )
+    rows = {r["path"]: r for r in sentences.table(fit)}
+    assert {r["unit"] for r in rows.values()} == {"kPa"}
+    assert rows["a"]["value"] == "0.0004 (not identified)"
+    assert rows["a"]["interval"] == ""
+    assert rows["b"]["value"] == "3.457 ± 0.012"
+    assert rows["b"]["interval"] == "3.433 to 3.48"
+    assert rows["c"]["value"] == "2.100 ± 0.90"
+
+
+@pytest.mark.parametrize("value", [3.2101, 0.0452, 812.34, 5.1e-6])
+def test_four_digits_stay_whatever_the_error(value):
+    for std in (0.1 * value, 0.5 * value, 3 * value):
+        shown = float(with_std(value, std).split(" ±")[0])
+        assert shown == pytest.approx(value, rel=5e-4 if std < value else 0.06)
+
+
+def test_curves_and_table_are_written(found, tmp_path):
+    rows = list(csv.DictReader(write_curves(found, tmp_path / "curves.csv").read_text().splitlines()))
+    assert len(rows) == 60
+    assert float(rows[30]["drive"]) == pytest.approx(STRETCH[30])
+    assert float(rows[30]["model"]) == pytest.approx(found.values["energy.mu"] * (STRETCH[30] - STRETCH[30] ** -2))
+    latex = write_latex(found, tmp_path / "t.tex").read_text()
+    assert latex.startswith(r"\begin{tabular}")
+    assert "energy.mu & " in latex
+
+
+def test_effects_off_is_the_energy_alone():
+    time = np.linspace(0, 30, 60)
+    stretch = 1 + 0.3 * ramp(time, (0, 0), (2, 1), (30, 1))
+    stress = 2000 * (stretch - stretch**-2) * (1 - 0.4 * (1 - np.exp(-np.maximum(time - 1, 0) / 4)))
+    made = recording("hold", "uniaxial", time, stretch)
+    channel = Channel(time, stress, "Pa", 20.0)
+    data = Sample("s", {"hold": Recording("hold", "uniaxial", made.inputs, {"nominal_stress": channel}, {})})
+    found = tj.fit(data, "neo-hookean", effects=["viscoelasticity"], multistart=1)
+    bare = FitOverlay().prepare(found)[0].bare
+    np.testing.assert_allclose(bare, found.values["energy.mu"] * (stretch - stretch**-2), rtol=1e-9, atol=1e-9)
