@@ -8,6 +8,7 @@ from tissuejax.challenge.compare import compare
 from tissuejax.challenge.grade import grade
 from tissuejax.challenge.make import KINDS, make
 from tissuejax.challenge.run import run
+from tissuejax.commands.arguments import positive
 from tissuejax.commands.command import Command, Reply
 from tissuejax.progress import for_terminal
 from tissuejax.report.challenge_table import figures
@@ -59,6 +60,7 @@ says what simpler ways of answering would have said on the same cases.
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Do one of the four."""
+        positive(given.jobs, "--jobs")
         if given.action == "make":
             which = {"strong": given.strong, "pairs": given.pairs, "commit": given.commit}
             made = make(given.folder, given.kind, given.count, given.seed, given.jobs, for_terminal(), **which)

@@ -4,11 +4,16 @@ import argparse
 from pathlib import Path
 from typing import ClassVar
 
+import equinox as eqx
+
 from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.outputs import folder
 from tissuejax.diagnosis.diagnose import diagnose
 from tissuejax.diagnosis.result import Diagnosis
+from tissuejax.errors import unknown
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read
+from tissuejax.recordings.recording import Sample
 from tissuejax.report import diagnosis_sentences as sentences
 from tissuejax.report.diagnosis_page import write_diagnosis
 
@@ -44,13 +49,17 @@ was stopped goes on where it was when the same command is given again.
         parser.add_argument(
             "--holdout", action="append", metavar="NAME", help="recording to hold out (repeat); default: the last one"
         )
+        parser.add_argument(
+            "--only", action="append", default=[], metavar="NAME", help="diagnose this recording (repeat for more)"
+        )
         parser.add_argument("--effect", action="append", metavar="NAME", help="try only these effects (repeat)")
-        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="where to write (default: out/SAMPLE)")
+        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="default: out/SAMPLE-diagnosis-ENERGY")
+        parser.add_argument("--force", action="store_true", help="overwrite another result in --out")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Read, diagnose, write."""
-        sample = read(given.file)
-        out = given.out or Path("out") / sample.name
+        sample = _only(read(given.file), given.only, given.holdout)
+        out = folder(given.out, "diagnosis", sample.name, given.energy, (), given.force)
         found = diagnose(
             sample,
             given.energy,
@@ -61,6 +70,17 @@ was stopped goes on where it was when the same command is given again.
             keep=out / "runs",
         )
         return told(found, write_diagnosis(found, out))
+
+
+def _only(sample: Sample, only: list[str], holdout: list[str] | None) -> Sample:
+    """The sample with the recordings named and those held out; all of them where none is named."""
+    for name in only:
+        if name not in sample.recordings:
+            raise unknown("recording", name, sample.recordings)
+    if not only:
+        return sample
+    kept = {n: r for n, r in sample.recordings.items() if n in only or n in (holdout or ())}
+    return eqx.tree_at(lambda s: s.recordings, sample, kept, is_leaf=lambda x: isinstance(x, dict))
 
 
 def told(found: Diagnosis, written: dict[str, Path]) -> Reply:

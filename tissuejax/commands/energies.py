@@ -10,6 +10,7 @@ from tissuejax.commands.command import Command, Reply
 from tissuejax.energies.catalogue import entries
 from tissuejax.energies.published import PUBLISHED
 from tissuejax.errors import InputError
+from tissuejax.parameters import checked
 from tissuejax.report.energy_curves import Material
 from tissuejax.report.page import write_figures
 
@@ -93,9 +94,8 @@ fibre family to any of them. Ogden constants mean nothing without their form, so
             within = (float(low), float(high))
         except ValueError:
             raise InputError(f"--stretch {given.stretch}: wanted is LOW:HIGH, e.g. 0.6:1.6") from None
-        wanted = {p: v for p, v in start.items() if p in model.parameters} | values(
-            given.set, model.parameters, "--set"
-        )
+        given_values = checked(values(given.set, model.parameters, "--set"), model.parameters)
+        wanted = {p: v for p, v in start.items() if p in model.parameters} | given_values
         material = Material(model, model.defaults | wanted, within)
         written = write_figures(material, given.out / given.plot)
         record = {"energy": given.plot, "values": material.values, "files": {n: str(p) for n, p in written.items()}}

@@ -7,8 +7,9 @@ from typing import ClassVar
 from tissuejax import verbs
 from tissuejax.commands.arguments import add_fit, add_model, fit_options
 from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.outputs import folder
 from tissuejax.fitting.advice import suspect
-from tissuejax.fitting.result import Fit
+from tissuejax.fitting.result import Fit, described
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read, read_all
 from tissuejax.report import sentences
@@ -54,7 +55,8 @@ written all the same, with a warning on top).
         add_model(parser)
         add_fit(parser)
         parser.add_argument("--each", action="store_true", help="fit every sample of FILE for itself, numbers only")
-        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="where to write (default: out/SAMPLE)")
+        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="default: out/SAMPLE-fit-ENERGY")
+        parser.add_argument("--force", action="store_true", help="overwrite another result in --out")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Read, fit, write."""
@@ -64,7 +66,8 @@ written all the same, with a warning on top).
         model = verbs.material(
             given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
         ).across(tuple(sample.recordings))
-        out = given.out or Path("out") / sample.name
+        effects = [e.name for e in model.effects]
+        out = folder(given.out, "fit", sample.name, described(model)["name"], effects, given.force)
         found = verbs.fit(
             sample, model, progress=for_terminal(), checkpoint=out / KEPT, **fit_options(given, model.parameters)
         )

@@ -69,28 +69,30 @@ Ranges of the Sobol indices are 20 % either side of each value unless given: --r
         parser.add_argument(
             "--samples", type=int, default=256, metavar="N", help="base samples of Sobol, a power of two (256)"
         )
-        parser.add_argument(
-            "--out", "-o", type=Path, default=Path("out/sensitivity"), metavar="FOLDER", help="where to write"
-        )
+        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="default: out/NAME-sensitivity")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Local, Fisher, Sobol; figures and sensitivity.json."""
         if (given.published is None) == (given.result is None):
             raise InputError("say what to look at: FILE --result RESULT.json, or --published NAME")
+        for option, share in (("--noise", given.noise), ("--spread", given.spread)):
+            if not 0 < share < float("inf"):
+                raise InputError(f"{option} {share}: it must be a share above zero, such as 0.02")
         model, values, made, level, paths = _published(given) if given.published else _fitted(given)
+        out = given.out or Path("out") / f"{given.published or made.sample.name}-sensitivity"
         found = local(made, values, paths, level)
         declared = made.model.parameters
         bounds = {p: _around(values[p], given.spread, declared[p]) for p in paths} | ranges(
             given.range, declared, "--range"
         )
-        written, record = write_figures(found, given.out), {"local": found.record()}
+        written, record = write_figures(found, out), {"local": found.record()}
         if len(bounds) > 1:
             indices = sobol(
                 made, values, bounds, n=positive(given.samples, "--samples"), batched=made.name == "homogeneous"
             )
             record["sobol"] = indices.record()
-            written = written | write_figures(indices, given.out)
-        written = dict(written) | {"numbers": write_json(given.out / "sensitivity.json", record)}
+            written = written | write_figures(indices, out)
+        written = dict(written) | {"numbers": write_json(out / "sensitivity.json", record)}
         record["files"] = {name: str(path) for name, path in written.items()}
         return Reply(record, text_of(record))
 

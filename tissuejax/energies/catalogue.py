@@ -110,6 +110,9 @@ def forms_of(energy: Energy, volumetric: Volumetric | None = None) -> dict[str, 
     return forms | {"volumetric": volumetric.formula if volumetric else "incompressible"}
 
 
+MOST = 9  # order of a series energy
+
+
 def _of(found: dict[str, type], kind: str, name: str, **options):
     """The member `name` or `name-N` of a family."""
     stem, order = (m[1], int(m[2])) if (m := re.fullmatch(r"(.*?)-(\d+)", name)) else (name, None)
@@ -119,6 +122,10 @@ def _of(found: dict[str, type], kind: str, name: str, **options):
     ordered = _ordered(cls)
     if ordered and not order:
         raise InputError(f"{kind} {name!r} needs its order, 1 or more: write {stem}-2 for order 2")
+    if ordered and order > MOST:
+        raise InputError(
+            f"{kind} {name!r}: order {order} has more constants than any test can tell; 1 to {MOST} can be had"
+        )
     if order is not None and not ordered:
         raise InputError(f"{kind} {name!r}: {stem!r} has no order; write {stem!r}")
     return cls(**options, **({"order": order} if ordered else {}))

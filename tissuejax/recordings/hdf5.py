@@ -63,6 +63,7 @@ def _with_file(path: Path, label: Path, use: Callable[[h5py.File, Source], objec
 
 
 def _sample(file: h5py.File, source: Source) -> Sample:
+    _refuse_links(file, source)
     mark = source.text(file, "format")
     if mark != MARK:
         found = "nothing" if mark is None else repr(mark)
@@ -98,6 +99,26 @@ def _sample(file: h5py.File, source: Source) -> Sample:
         source=source.text(file, "source") or "",
         notes=source.text(file, "notes") or "",
     )
+
+
+def _refuse_links(group: h5py.Group, source: Source) -> None:
+    """Refuse links and storage outside the file: a file that was sent could show other files of the reader's."""
+    for name in group:
+        link = group.get(name, getlink=True)
+        place = f"{group.name.rstrip('/')}/{name}"
+        if isinstance(link, h5py.ExternalLink):
+            advice = "A recording file holds its own data: copy them in."
+            raise source.refusal(place, f"a link to another file ({link.filename})", "data in this file", advice)
+        if isinstance(link, h5py.SoftLink):
+            raise source.refusal(
+                place, f"a soft link to {link.path}", "data in their own place", "Copy the data there."
+            )
+        item = group[name]
+        if isinstance(item, h5py.Group):
+            _refuse_links(item, source)
+        elif isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
+            advice = "A recording file holds its own data: copy them in."
+            raise source.refusal(place, "data stored in another file", "data in this file", advice)
 
 
 def _in_order(group: h5py.Group) -> list[str]:
