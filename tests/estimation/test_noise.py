@@ -45,6 +45,14 @@ def test_on_even_samples_it_is_a_first_order_autoregression():
     np.testing.assert_allclose(np.var(z, axis=1), 1.0, atol=0.11)
 
 
+@pytest.mark.parametrize("time", [EVEN, LOGS], ids=["even", "logarithmic"])
+@pytest.mark.parametrize("noise", NOISES, ids=str)
+def test_products_with_the_covariance(rng, noise, time):
+    x, dense = rng.normal(size=(60, 3)), noise.covariance(time)
+    np.testing.assert_allclose(noise.times(x, time), dense @ x, atol=1e-9)
+    assert noise.squares(time) == pytest.approx(np.sum(dense**2), rel=1e-9)
+
+
 def test_draws_have_the_covariance_that_is_said():
     noise, time, rng = Noise(0.6, 0.9, 0.5), np.array([0.0, 0.1, 0.15, 1.0, 1.0 + 1e-9]), np.random.default_rng(2)
     draws = np.stack([noise.sample(rng, time) for _ in range(20000)])

@@ -3,13 +3,16 @@
 import numpy as np
 import pytest
 import scipy.optimize
+import scipy.signal
 from toy import ToyPredictor, curve, toy_sample
 
 from tissuejax.errors import InputError, NotConverged
+from tissuejax.fitting.advice import mean_factor
 from tissuejax.fitting.least_squares import descend, fit, required
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.profile import profile
 from tissuejax.fitting.weights import noise
+from tissuejax.recordings.recording import Channel, Recording, Sample
 
 TRUE = {"energy.a": 80.0, "energy.b": 40.0, "energy.rate": 0.7, "energy.offset": 5.0}
 ALL = tuple(TRUE)
@@ -42,15 +45,107 @@ def test_estimates_agree_with_scipy_and_lie_within_their_intervals(rng):
     assert 0.8 < found.chi2_per_dof < 1.2
 
 
-def test_standard_errors_cover_the_truth_as_often_as_they_say(rng):
-    inside = []
-    for _ in range(60):
-        p = problem(
-            toy_sample(rng, TRUE, n=60), ("energy.a", "energy.rate"), start={"energy.b": 40.0, "energy.offset": 5.0}
-        )
-        found = fit(p, multistart=1)
-        inside += [abs(found.values[k] - TRUE[k]) < 1.96 * found.std[k] for k in p.free]
-    assert 0.87 <= np.mean(inside) <= 1.0  # 95 % of 120, three standard deviations of the count
+def test_widening_goes_by_the_residuals_where_they_contradict_the_stated_noise(rng):
+    """Noise stated half of what it is: scipy's covariance times chi-square per degree of freedom, 4 or so."""
+    sample = toy_sample(rng, TRUE, noise=2.0)
+    understated = {"nominal_stress": 1.0}
+    p = problem(sample, choice=understated)
+    found = fit(p)
+    r, jacobian = p.linearised(found.values)
+    level = float(r @ r) / (800 - 4)
+    assert level == pytest.approx(4.0, rel=0.2)
+    np.testing.assert_allclose(found.covariance, level * np.linalg.inv(jacobian.T @ jacobian), rtol=1e-6)
+    assert found.uncertainty.dof == pytest.approx(796, rel=0.01)
+    right = fit(problem(sample, choice={"nominal_stress": 2.0}))
+    assert right.uncertainty.dof == np.inf
+    np.testing.assert_allclose(list(found.std.values()), list(right.std.values()), rtol=0.1)
+
+
+def test_student_s_quantile_where_the_level_comes_from_few_residuals(rng):
+    sample = toy_sample(rng, TRUE, n=7, names=("r1",), recorded=False)
+    found = fit(problem(sample, ("energy.a", "energy.b", "energy.offset"), start={"energy.rate": 0.7}))
+    assert found.uncertainty.dof == pytest.approx(4, abs=1e-6)
+    assert found.uncertainty.quantile() == pytest.approx(2.776, abs=1e-3)  # tables of Student's t, 4 degrees
+    low, high = found.intervals["energy.offset"]
+    assert high - low == pytest.approx(2 * 2.776 * found.std["energy.offset"], rel=1e-3)
+    noise_known = fit(problem(toy_sample(rng, TRUE)))
+    assert noise_known.uncertainty.quantile() == pytest.approx(1.95996, abs=1e-5)
+    record = noise_known.record()["parameters"]["energy.a"]
+    assert record["interval"] == pytest.approx(list(noise_known.intervals["energy.a"]))
+
+
+def test_the_estimated_level_is_unbiased_with_few_samples():
+    """Mean of the squared levels over draws of 7 samples and 3 parameters: the true variance, not 4/7 or 7/4 of it."""
+    squares = []
+    for trial in range(60):
+        sample = toy_sample(np.random.default_rng(trial), TRUE, n=7, names=("r1",), noise=2.0, recorded=False)
+        p = problem(sample, ("energy.a", "energy.b", "energy.offset"), start={"energy.rate": 0.7})
+        squares.append(fit(p, multistart=1).problem.noise.std["r1/nominal_stress"] ** 2)
+    assert np.mean(squares) == pytest.approx(4.0, rel=0.3)  # chi-square with 4 degrees, mean of 60: 9 %
+
+
+def correlated_sample(rng, rho, noise, stated, n=400):
+    """The curve in two recordings with autoregressive noise."""
+    sample = toy_sample(rng, TRUE, noise=0.0, recorded=False, n=n)
+    recordings = {}
+    for name, r in sample.recordings.items():
+        c = r.channels["nominal_stress"]
+        e = scipy.signal.lfilter([np.sqrt(1 - rho**2)], [1, -rho], rng.normal(size=n + 300))[300:]
+        channel = Channel(c.time, c.values + noise * e, "Pa", stated)
+        recordings[name] = Recording(name, "toy", r.inputs, {"nominal_stress": channel}, {})
+    return Sample("toy", recordings)
+
+
+def drawn(make, free, draws):
+    """Estimates and standard errors over independent draws, and how often intervals hold the truth."""
+    values, std, inside = [], [], []
+    for trial in range(draws):
+        found = fit(problem(make(np.random.default_rng(trial)), free, start=TRUE), multistart=1)
+        values.append([found.values[k] for k in free])
+        std.append([found.std[k] for k in free])
+        inside.append([low < TRUE[k] < high for k, (low, high) in found.intervals.items()])
+    return np.std(values, axis=0), np.sqrt(np.mean(np.square(std), axis=0)), np.mean(inside)
+
+
+TWO = ("energy.a", "energy.rate")
+CASES = {
+    "white": lambda rng: toy_sample(rng, TRUE, n=60),
+    "stated half": lambda rng: correlated_sample(rng, 0.0, 2.0, 1.0, n=60),
+    "stated double": lambda rng: correlated_sample(rng, 0.0, 0.5, 1.0, n=60),
+    "AR 0.9": lambda rng: correlated_sample(rng, 0.9, 1.0, 1.0),
+    "AR 0.9, stated half": lambda rng: correlated_sample(rng, 0.9, 2.0, 1.0),
+}
+
+
+def test_what_is_said_of_correlated_residuals_is_what_was_done(rng):
+    slow = fit(problem(correlated_sample(rng, 0.9, 1.0, 1.0), TWO, start=TRUE), multistart=1)
+    independent = fit(problem(toy_sample(rng, TRUE), TWO, start=TRUE), multistart=1)
+    times = max(slow.std[k] / independent.std[k] for k in TWO)
+    (said,) = [w for w in slow.warnings if "serially correlated" in w]
+    assert f"{times:.1f} times larger" in said
+    assert 2 < times < 19**0.5
+    assert mean_factor(0.6) == pytest.approx(2.0)  # (1 + 0.6) / (1 - 0.6) = 4
+
+
+def test_noise_stated_too_large_is_said(rng):
+    found = fit(problem(correlated_sample(rng, 0.0, 0.5, 1.0), TWO, start=TRUE), multistart=1)
+    assert any("times the recorded noise: check the noise level" in w for w in found.warnings)
+
+
+@pytest.mark.parametrize("case", list(CASES)[:4])
+def test_standard_errors_are_the_scatter_of_the_estimates(case):
+    """From both sides: 60 draws know a scatter to 9 %."""
+    scatter, std, inside = drawn(CASES[case], TWO, 60)
+    np.testing.assert_allclose(std, scatter, rtol=0.27)
+    assert 0.88 <= inside <= 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES)
+def test_intervals_cover_95_percent_over_400_draws(case):
+    scatter, std, inside = drawn(CASES[case], TWO, 400)
+    np.testing.assert_allclose(std, scatter, rtol=0.1)
+    assert inside == pytest.approx(0.95, abs=0.02)
 
 
 def test_noise_that_was_not_recorded_is_estimated(rng):
@@ -129,10 +224,28 @@ def test_bounds_are_kept_and_reported(rng):
 def test_profile_agrees_with_the_standard_error_of_a_nearly_linear_problem(rng):
     p = problem(toy_sample(rng, TRUE), ("energy.a", "energy.rate"), start={"energy.b": 40.0, "energy.offset": 5.0})
     found = fit(p)
+    check_profile(found, 1.96)
+
+
+def check_profile(found, quantile):
+    """Both ends a quantile of standard errors from the estimate, to 3 % of that distance."""
     scan = profile(found, "energy.a")
     centre, std = found.values["energy.a"], found.std["energy.a"]
-    assert scan.interval == pytest.approx((centre - 1.96 * std, centre + 1.96 * std), rel=0.02)
+    assert centre - scan.interval[0] == pytest.approx(quantile * std, rel=0.03)
+    assert scan.interval[1] - centre == pytest.approx(quantile * std, rel=0.03)
     assert scan.rise.min() >= -1e-3
+
+
+def test_profile_and_covariance_agree_where_the_noise_is_not_as_stated(rng):
+    start = {"energy.b": 40.0, "energy.offset": 5.0}
+    half = correlated_sample(rng, 0.0, 2.0, 1.0)
+    check_profile(fit(problem(half, TWO, start=start)), 1.963)
+    slow = fit(problem(correlated_sample(rng, 0.9, 1.0, 1.0), TWO, start=start))
+    assert np.all(slow.uncertainty.inflation > 4)  # (1 + rho) / (1 - rho) = 19 at most
+    check_profile(slow, slow.uncertainty.quantile())
+    few = fit(problem(toy_sample(rng, TRUE, n=8, names=("r1",), recorded=False, noise=0.1), TWO, start=start))
+    assert few.uncertainty.dof == pytest.approx(6)
+    check_profile(few, 2.447)  # Student's t, 6 degrees
 
 
 def test_holdout_is_scored_but_not_fitted(rng):

@@ -135,6 +135,19 @@ class Noise:
         """Independent samples that tell as much of a constant as those at `time`: std^2 1' C^-1 1."""
         return self.std**2 * float(np.sum(self.whiten(np.ones(len(time)), time) ** 2))
 
+    def times(self, x: Float[np.ndarray, "n ..."], time: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n ..."]:
+        """Covariance at `time` times x, in O(n): what came before fades forwards, what comes after backwards."""
+        columns = np.asarray(x, float).reshape(len(time), -1)
+        fade = np.exp(-np.diff(np.asarray(time, float)) / self.tau)
+        both = _faded(fade, columns) + _faded(fade[::-1], columns[::-1])[::-1]
+        return (self.std**2 * columns + self.correlated**2 * both).reshape(np.shape(x))
+
+    def squares(self, time: Float[np.ndarray, " n"]) -> float:
+        """Sum of the squares of the covariance matrix at `time`; n std^4 for white noise."""
+        fade = np.exp(-2 * np.diff(np.asarray(time, float)) / self.tau)
+        before = _faded(fade, np.ones((len(time), 1)))
+        return len(time) * self.std**4 + 2 * self.correlated**4 * float(np.sum(before))
+
     def sample(self, rng: np.random.Generator, time: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
         """One draw at `time`."""
         time = np.asarray(time, float)
@@ -145,6 +158,15 @@ class Noise:
         for k, f in enumerate(np.concatenate([[0.0], fade])):
             last = part[k] = f * last + kick[k]
         return self.correlated * part + self.white * rng.normal(size=len(time))
+
+
+def _faded(fade: Float[np.ndarray, " m"], x: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+    """m[i] = fade[i-1] (m[i-1] + x[i-1]), m[0] = 0."""
+    band = np.ones((2, len(x)))
+    band[1, :-1] = -fade
+    right = np.zeros_like(x)
+    right[1:] = fade[:, None] * x[:-1]
+    return lapack.dtbtrs(band, right, uplo="L", diag="U")[0]
 
 
 HALF_LOG_2PI = 0.5 * math.log(2 * math.pi)

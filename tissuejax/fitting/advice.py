@@ -3,6 +3,8 @@
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from tissuejax.fitting.stability import sentence
 
 if TYPE_CHECKING:
@@ -67,6 +69,12 @@ def suspect(found: "Fit") -> list[str]:
 
 def _misfit(found: "Fit") -> list[str]:
     bad = beyond_noise(found)
+    small = {k: math.sqrt(s.chi2_per_sample) for k, s in found.channels.items() if k not in found.problem.noise.groups}
+    if small and math.isfinite(found.uncertainty.dof) and max(small.values()) < 1:
+        return [
+            f"The residuals are only {max(small.values()):.2f} times the recorded noise: check the noise level. "
+            "Standard errors go by the residuals."
+        ]
     if not bad:
         return []
     worst = sorted(bad, key=bad.get, reverse=True)
@@ -81,11 +89,19 @@ def _serial(found: "Fit") -> list[str]:
     if worst is None or worst[1].autocorrelation < SERIAL:
         return []
     rho = min(worst[1].autocorrelation, 0.999)
-    factor = math.sqrt((1 + rho) / (1 - rho))
-    return [
+    said = (
         f"Residuals of {worst[0]} are serially correlated ({rho:.2f} from one sample to the next), so samples are not "
-        f"independent and the standard errors are too small, by up to a factor of about {factor:.1f}."
-    ]
+    )
+    inflation = found.uncertainty.inflation
+    if inflation is not None and found.uncertainty.serial:
+        factor = math.sqrt(float(np.max(inflation)))
+        return [f"{said}independent; the standard errors allow for it and are up to {factor:.1f} times larger."]
+    return [f"{said}independent and the standard errors are too small, by up to about {mean_factor(rho):.1f} times."]
+
+
+def mean_factor(rho: float) -> float:
+    """Standard error of a mean of samples with correlation `rho` between neighbours, over that of independent ones."""
+    return math.sqrt((1 + rho) / (1 - rho))
 
 
 def _held_out(found: "Fit") -> list[str]:

@@ -21,11 +21,13 @@ from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
 from tissuejax.fitting.separable import NotSeparable, projected_descent, separable
+from tissuejax.fitting.serial import Serial, serial
 from tissuejax.fitting.stability import recorded_stability
 from tissuejax.fitting.starts import fitted_moduli, variations
 from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
 
 METHODS = ("levenberg-marquardt", *GRADIENT_METHODS)
+CONTRADICTED = 3.5  # standard deviations of chi-square from which the recorded noise is not what the residuals have
 AGAIN = 3  # rounds of re-estimating several unknown noise levels
 
 
@@ -175,10 +177,11 @@ def required(found: Fit) -> Fit:
 
 
 def curvature(problem: Problem, values: Mapping[str, float]) -> Uncertainty:
-    """Uncertainty of the free parameters at `values`, widened where the misfit exceeds the noise."""
+    """Uncertainty of the free parameters at `values`: under correlated noise, by the residuals' own scatter where that
+    contradicts the recorded noise or none was recorded."""
     r, jacobian = problem.linearised(values)
-    dof = max(1, len(r) - len(problem.free))
-    widening = max(1.0, float(np.sqrt(float(r @ r) / dof)))
+    memory = serial(problem, r)
+    widening, dof = _scatter(problem, r, jacobian, memory)
     declared = problem.predictor.model.parameters
     return uncertainty(
         jacobian,
@@ -187,7 +190,20 @@ def curvature(problem: Problem, values: Mapping[str, float]) -> Uncertainty:
         tuple(path.removeprefix("energy.") for path in problem.free),
         tuple(declared[path].unit for path in problem.free),
         widening,
+        correlated=memory.times if memory.parts else None,
+        dof=dof,
     )
+
+
+def _scatter(problem: Problem, r: np.ndarray, jacobian: np.ndarray, memory: Serial) -> tuple[float, float]:
+    """What to widen standard errors by, and the degrees of freedom behind it."""
+    u, s, _ = np.linalg.svd(jacobian / np.linalg.norm(jacobian, axis=0).clip(1e-300), full_matrices=False)
+    u = u[:, s > 1e-10 * s[0]]
+    left = max(len(r) - float(np.sum(u * memory.times(u))), 1.0)  # what squares add up to beside the fit
+    squares = memory.squares(len(r)) * left / len(r)
+    chi2 = float(r @ r)
+    known = not problem.noise.estimated and abs(chi2 - left) < CONTRADICTED * np.sqrt(2 * squares)
+    return (1.0, np.inf) if known else (float(np.sqrt(chi2 / left)), max(1.0, left**2 / squares))
 
 
 def _with_estimated_noise(problem: Problem, best: Descent, options) -> tuple[Problem, Descent, int]:

@@ -252,7 +252,8 @@ def _with_shifts(noise: Uncertainty, shifts: list[Float[np.ndarray, " p"]]) -> U
     """Numerical shifts added in quadrature to what noise leaves open."""
     covariance = noise.covariance + sum((np.outer(s, s) for s in shifts), np.zeros_like(noise.covariance))
     std = np.where(np.isfinite(noise.std), np.sqrt(np.diag(covariance)), np.inf)
-    return Uncertainty(std, covariance, covariance / np.outer(std, std), noise.condition, noise.sentences)
+    correlation = covariance / np.outer(std, std)
+    return Uncertainty(std, covariance, correlation, noise.condition, noise.sentences, noise.inflation, noise.dof)
 
 
 def _numerical_sentence(free, shifts, noise: Uncertainty) -> str:

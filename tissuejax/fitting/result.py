@@ -89,6 +89,17 @@ class Fit:
         return dict(zip(self.free, map(float, self.uncertainty.std), strict=True))
 
     @property
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """95 % intervals by path, from standard errors and Student's quantile, cut at the declared bounds."""
+        half = self.uncertainty.quantile()
+        found = {}
+        for path, std in self.std.items():
+            lower, upper = self.problem.bound(path)
+            value = self.values[path]
+            found[path] = max(value - half * std, lower), min(value + half * std, upper)
+        return found
+
+    @property
     def covariance(self) -> np.ndarray:
         """(p, p), order of `free`."""
         return self.uncertainty.covariance
@@ -120,6 +131,7 @@ class Fit:
                 path: {
                     "value": float(value),
                     "std": self.std.get(path),
+                    "interval": list(self.intervals[path]) if path in self.free else None,
                     "unit": declared[path].unit,
                     "at_bound": self.at_bound.get(path),
                     "free": path in self.free,
@@ -128,6 +140,7 @@ class Fit:
             },
             "correlation": {"paths": list(self.free), "matrix": self.correlation.tolist()},
             "condition_number": self.uncertainty.condition,
+            "interval": {"confidence": 0.95, "degrees_of_freedom": self.uncertainty.dof},
             "not_identified": list(self.uncertainty.sentences),
             "chi2": self.chi2,
             "chi2_per_dof": self.chi2_per_dof,

@@ -1,13 +1,18 @@
 """How well the data determine the parameters: covariance, correlation, condition, and in words what is not seen.
 
-At the optimum the covariance is (J'J)^-1 in noise units. A misfit larger than the noise (chi-square per degree of
-freedom above one) widens it by that factor, since then the residuals are the better measure of what a sample is worth.
+At the optimum the covariance is (J'J)^-1 in noise units where samples are independent; where noise is correlated it is
+(J'J)^-1 J'VJ (J'J)^-1. Where the residuals contradict the recorded noise, or none was recorded, their own scatter says
+what a sample is worth; then intervals follow Student's distribution with the residuals' degrees of freedom.
 """
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 from jaxtyping import Float
+from scipy.stats import t as student
 
 UNSEEN = 1.0  # a combination whose relative standard error exceeds this is called not identified
 SHARE = 0.3  # a parameter takes part in a combination from this share of its largest member on
@@ -23,6 +28,9 @@ class Uncertainty:
         correlation: (p, p).
         condition: condition number of the Jacobian with relative parameters as columns.
         sentences: what the data do not tell apart.
+        inflation: variances over those that independent samples of the stated noise would give.
+        dof: degrees of freedom of the noise's level; infinite where the recorded one was used.
+        serial: whether they allow for correlated residuals.
     """
 
     std: Float[np.ndarray, " p"]
@@ -30,6 +38,17 @@ class Uncertainty:
     correlation: Float[np.ndarray, "p p"]
     condition: float
     sentences: tuple[str, ...]
+    inflation: Float[np.ndarray, " p"] | None = None
+    dof: float = math.inf
+    serial: bool = False
+
+    def quantile(self, confidence: float = 0.95) -> float:
+        """Half-width of a two-sided interval over the standard error: Student's t, 1.96 where the noise is known."""
+        return float(student.ppf(0.5 + confidence / 2, self.dof)) if math.isfinite(self.dof) else _normal(confidence)
+
+
+def _normal(confidence: float) -> float:
+    return NormalDist().inv_cdf(0.5 + confidence / 2)
 
 
 def uncertainty(
@@ -39,6 +58,9 @@ def uncertainty(
     labels: tuple[str, ...],
     units: tuple[str, ...],
     widening: float = 1.0,
+    *,
+    correlated: Callable[[Float[np.ndarray, "n p"]], Float[np.ndarray, "n p"]] | None = None,
+    dof: float = math.inf,
 ) -> Uncertainty:
     """Uncertainty from the Jacobian of the residuals (in units of the noise) at the optimum.
 
@@ -48,14 +70,18 @@ def uncertainty(
         scale: typical magnitudes, used where a parameter is near zero.
         labels: names for the sentences.
         units: their units; a combination of equal units is written as a sum, of different ones as a product.
-        widening: factor on the standard errors (square root of the chi-square per degree of freedom, if above one).
+        widening: factor on the standard errors: the noise's standard deviation over the stated one.
+        correlated: multiplies by the covariance matrix of the residuals; none for independent ones.
+        dof: degrees of freedom behind `widening`; infinite where the stated noise is used.
     """
     size = np.maximum(np.abs(x), 1e-3 * scale)
-    _, s, vt = np.linalg.svd(jacobian * size, full_matrices=False)
+    u, s, vt = np.linalg.svd(jacobian * size, full_matrices=False)
     top = s[0] if len(s) and s[0] > 0 else 1.0
     floor = 1e-13 * top
     inverse = 1 / np.maximum(s, floor)
-    relative = (vt.T * inverse**2) @ vt * widening**2
+    plain = (vt.T * inverse**2) @ vt
+    spread = np.eye(len(s)) if correlated is None else u.T @ correlated(u)
+    relative = (vt.T * inverse) @ spread @ (inverse[:, None] * vt) * widening**2
     covariance = relative * np.outer(size, size)
     std = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(std, std)
@@ -69,7 +95,16 @@ def uncertainty(
         for value, v in zip(s, vt, strict=True)
         if widening / max(value, floor) > UNSEEN
     )
-    return Uncertainty(std, covariance, correlation, condition, sentences)
+    return Uncertainty(
+        std,
+        covariance,
+        correlation,
+        condition,
+        sentences,
+        np.diag(relative) / np.diag(plain),
+        dof,
+        correlated is not None,
+    )
 
 
 def unseen(

@@ -4,7 +4,6 @@ import math
 
 from tissuejax.energies.catalogue import name_of
 from tissuejax.fitting.advice import beyond_noise
-from tissuejax.fitting.bands import NORMAL_95
 from tissuejax.fitting.result import Fit
 from tissuejax.report.scales import display, with_std
 
@@ -101,16 +100,14 @@ def table(found: Fit) -> list[dict[str, str]]:
         if found.values[path]:
             sizes.setdefault(declared[path].unit, []).append(abs(found.values[path]))
     common = {unit: display(unit, sorted(of)[len(of) // 2]) for unit, of in sizes.items()}
-    rows = []
+    rows, intervals = [], found.intervals
     for path, value in found.values.items():
         factor, unit = common.get(declared[path].unit) or display(declared[path].unit, abs(value))
         std = found.std.get(path)
         known = std is not None and identified(value, std, declared[path].typical)
         interval = ""
         if known:
-            low, high = found.problem.bound(path)
-            ends = (max(low, value - NORMAL_95 * std), min(high, value + NORMAL_95 * std))
-            interval = " to ".join(f"{end / factor:.4g}" for end in ends)
+            interval = " to ".join(f"{end / factor:.4g}" for end in intervals[path])
         note = f"at its {found.at_bound[path]} bound" if path in found.at_bound else ""
         rows.append(
             {

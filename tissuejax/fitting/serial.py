@@ -1,0 +1,79 @@
+"""Serial correlation of a fit's residuals: what samples are worth that are not independent.
+
+The estimate stays the least-squares one; its covariance is that of least squares under correlated noise,
+(J'J)^-1 J'VJ (J'J)^-1, with V from the residuals (`estimation.correlation`). Their degrees of freedom follow
+Satterthwaite: squares of correlated residuals scatter more than those of as many independent ones.
+
+Sources: Seber and Wild 1989, Nonlinear Regression, sec. 6.2 (least squares under autocorrelated errors); Satterthwaite
+1946, Biometrics Bull. 2:110.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from tissuejax.estimation.correlation import LEAST, Series, estimate
+from tissuejax.estimation.noise import Noise
+from tissuejax.fitting.problem import Problem
+
+NOTICED = 2.5  # standard deviations of a lag-one correlation from which the shape of the noise is sought
+
+
+@dataclass(frozen=True)
+class Serial:
+    """Noise shapes (standard deviation 1) of those rows of the residuals that are correlated.
+
+    Attributes:
+        parts: rows, times and noise of each series; all other rows are independent.
+    """
+
+    parts: tuple[tuple[np.ndarray, np.ndarray, Noise], ...] = field(default_factory=tuple)
+
+    def times(self, x: Float[np.ndarray, "n p"]) -> Float[np.ndarray, "n p"]:
+        """V x."""
+        out = np.array(x, float)
+        for rows, time, noise in self.parts:
+            out[rows] = noise.times(x[rows], time)
+        return out
+
+    def squares(self, n: int) -> float:
+        """Trace of V V, for n rows in all."""
+        inside = sum(len(rows) for rows, _, _ in self.parts)
+        return n - inside + sum(noise.squares(time) for _, time, noise in self.parts)
+
+
+def serial(problem: Problem, residuals: Float[np.ndarray, " n"]) -> Serial:
+    """The correlation of the noise in `residuals`, by channel; none where neighbours are as good as independent."""
+    parts = []
+    for channel in dict.fromkeys(c for _, c in problem.channels):
+        columns = [x for key in problem.channels if key[1] == channel for x in _columns(problem, key)]
+        columns = [(rows, time) for rows, time in columns if len(rows) >= LEAST]
+        if not any(_noticed(residuals[rows]) for rows, _ in columns):
+            continue
+        found = estimate([Series(time, residuals[rows][:, None]) for rows, time in columns], recorded=False)
+        parts += [
+            (rows, time, noise)
+            for (rows, time), noise in zip(columns, found.noises, strict=True)
+            if not noise.is_white(time)
+        ]
+    return Serial(tuple(parts))
+
+
+def _columns(problem: Problem, key: tuple[str, str]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Rows and times of every component of a channel, lost samples left out."""
+    channel = problem.predictor.sample.recordings[key[0]].channels[key[1]]
+    kept, width = problem.seen[key], max(1, np.asarray(channel.values).size // max(len(channel.time), 1))
+    first, time = problem.rows[key].start, np.asarray(channel.time, float)
+    found = []
+    for column in range(width):
+        mine = np.flatnonzero(kept % width == column)
+        found.append((first + mine, time[kept[mine] // width]))
+    return found
+
+
+def _noticed(r: Float[np.ndarray, " n"]) -> bool:
+    r = r - r.mean()
+    total = float(r @ r)
+    return total > 0 and float(r[1:] @ r[:-1]) / total > NOTICED / math.sqrt(len(r))
