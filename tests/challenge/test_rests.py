@@ -8,6 +8,8 @@ import pytest
 from tissuejax.challenge import files, measured, places, rest_cases
 from tissuejax.challenge.make import make, seed_of
 from tissuejax.challenge.material import Specimen, reported
+from tissuejax.challenge.probing_bench import Record as Press
+from tissuejax.challenge.probing_rest import beside
 from tissuejax.challenge.protocols import trials
 from tissuejax.challenge.rest_marks import mark_rest, true_size
 from tissuejax.challenge.rests import rests
@@ -194,3 +196,24 @@ def test_the_seed_belongs_to_the_commit_and_to_the_kind(tmp_path):
     assert np.any(kept != 0)
     assert "rest" not in (tmp_path / "manifest.json").read_text().replace('"kind": "rest"', "")
     json.dumps(keys)
+
+
+def press(name, start, force):
+    time = np.linspace(0, 4, 250)
+    depth = 4e-3 * np.interp(time, [0, 1, 2, 3, 4], [0, 1, 1, 0, 0])
+    probe = np.stack([0 * time, 0 * time, 0.03 - depth], -1)
+    value = force * np.stack([0.05 * depth, 0 * depth, depth**1.5 * 1e3], -1)
+    return Press(name, start, 0.009, time, probe, time, value, time[::4], np.zeros((63, 2, 3)))
+
+
+def test_a_probing_s_rest_is_the_asked_share_and_leaves_the_markers():
+    bare = [press(f"r{i}", 100.0 * i, 1.0) for i in range(3)]
+    clean = [press(f"r{i}", 100.0 * i, 1.2 - 0.3 * i) for i in range(3)]
+    found = beside(np.random.default_rng(2), clean, bare, [8.0, 12.0], 0.003)
+    assert found.key["rest"]["over_noise"] == pytest.approx(8.0 * found.key["rest"]["ratio"])
+    squares = [found.key["rest"]["beyond_rms"][n] ** 2 for n in ("r0", "r1")]
+    assert np.sqrt(np.mean(squares)) / 0.003 == pytest.approx(found.key["rest"]["over_noise"], rel=1e-6)
+    for a, b in zip(clean, found.presses):
+        assert a.markers is b.markers
+        assert np.any(a.force != b.force)
+    assert set(found.key["where"]["phases"]) <= set(places.PHASES)

@@ -38,7 +38,7 @@ def grade(folder: str | os.PathLike, out: str | os.PathLike | None = None) -> di
     manifest = files.read_manifest(folder)
     out = Path(out) if out else folder
     made = {k: manifest.get(k) for k in ("kind", "seed", "commit", "keys_sha256")}
-    if manifest["kind"] == "rest":
+    if manifest["kind"] == "rest" or manifest.get("rest"):
         found, lines = grade_rest(folder, manifest)
         write_text(out / "graded.csv", table(lines))
         write_json(out / "graded.json", found | made)

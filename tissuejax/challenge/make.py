@@ -29,6 +29,7 @@ def make(
     strong: bool = False,
     pairs: bool = False,
     commit: str | None = None,
+    rest: bool = False,
 ) -> dict:
     """Make `count` cases and return the manifest.
 
@@ -44,6 +45,7 @@ def make(
         progress: told after every case.
         strong: probings with strong effects only, one or two of them: how often is right what can be seen?
         pairs: probings with two effects each, both of those that can be seen at all, at the upper end of their range.
+        rest: probings with a rest in the force that no catalogue has, beside their effects or alone.
         commit: hash of the commit that will be measured; the seed is drawn from it, so that nobody chooses it.
 
     Raises:
@@ -55,11 +57,13 @@ def make(
         raise unknown("kind of challenge", kind, KINDS)
     if count < 1 or jobs < 1:
         raise InputError(f"count {count}, jobs {jobs}: both must be 1 or more")
-    if strong and pairs:
-        raise InputError("--strong has pairs among its cases already; give it or --pairs")
-    if (strong or pairs) and kind != "probing":
-        raise InputError("strong cases are made of probings only; leave --strong, --pairs out, or take --kind probing")
-    which = {"strong": strong, "pairs": pairs}
+    if strong + pairs + rest > 1:
+        raise InputError("--strong, --pairs, --rest: one of them at most (strong ones have pairs among them already)")
+    if (strong or pairs or rest) and kind != "probing":
+        raise InputError(
+            "--strong, --pairs, --rest are of probings; take --kind probing, or --kind rest for material tests"
+        )
+    which = {"strong": strong, "pairs": pairs} | ({"rest": True} if rest else {})
     told = {} if commit is None else {"commit": commit}
     if commit is not None:
         seed = seed_of(commit, kind, which)

@@ -13,6 +13,8 @@ from tissuejax.challenge.material_cases import correlated
 from tissuejax.challenge.probe_paths import draw as draw_path
 from tissuejax.challenge.probing_bench import MESH, Record, record
 from tissuejax.challenge.probing_menu import CATALOGUED, LOUD, STRAY, Course
+from tissuejax.challenge.probing_rest import beside
+from tissuejax.challenge.rest_cases import category as rest_category
 from tissuejax.challenge.solid import Tissue
 from tissuejax.errors import NotConverged
 from tissuejax.storage import replacing
@@ -51,7 +53,7 @@ def strong_category(index: int) -> tuple[str, int]:
 
 def courses(rng: np.random.Generator, kind: str, turn: int, menu: tuple[Course, ...] = CATALOGUED) -> list[Course]:
     """Effects of a case; single ones take their turn."""
-    if kind == "none":
+    if kind in ("none", "rest"):
         return []
     if kind == "unknown":
         return [STRAY[turn % len(STRAY)]]
@@ -99,19 +101,26 @@ def draw(
     mesh: tuple[int, int, int] = MESH,
     strong: bool = False,
     pairs: bool = False,
+    rest: bool = False,
 ) -> Probing:
-    """The case with this seed and number (minutes of one core); redrawn if a body finds no equilibrium."""
-    menu, draws = (LOUD, LOUDEST) if pairs else (CATALOGUED, STRONG if strong else 1)
+    """The case with this seed and number (minutes of one core); redrawn if a body finds no equilibrium.
+
+    Args:
+        rest: one or two effects beside a rest in the force that no catalogue has, or the rest alone.
+    """
+    menu, draws = (LOUD, LOUDEST) if pairs else (CATALOGUED, STRONG if strong or rest else 1)
     if strong:
         kind, turn = strong_category(index)
     if pairs:
         kind, turn = "two", index
+    if rest:
+        kind = rest_category(index)
     with threadpool_limits(1):
         for attempt in range(6):
             rng = np.random.default_rng([seed, index, attempt, 2])
             try:
                 kind, turn = kind or category(index), index if turn is None else turn
-                return _draw(name, rng, kind, turn, mesh, menu, draws)
+                return _draw(name, rng, kind, turn, mesh, menu, draws, rest)
             except NotConverged:
                 continue
     raise NotConverged(f"probing case {name}: no equilibrium in 6 draws; choose another seed")
@@ -125,6 +134,7 @@ def _draw(
     mesh: tuple[int, int, int],
     menu: tuple[Course, ...],
     draws: int,
+    rest: bool = False,
 ) -> Probing:
     lobe = body(rng)
     C10 = float(np.exp(rng.uniform(np.log(400), np.log(1000))))
@@ -172,6 +182,10 @@ def _draw(
         for one in added:
             alone = clean[:2] if len(added) == 1 else recorded([one], 2)
             sizes[one.name] = beyond(bare, alone, noise)
+    more: dict = {}
+    if rest:
+        found = beside(rng, clean, recorded([]) if added else clean, list(sizes.values()), noise[0])
+        clean, more = found.presses, found.key
     noisy, errors = [], {}
     for r in clean:
         e = np.stack([correlated(rng, len(r.force), rho) for _ in range(3)], -1)
@@ -197,7 +211,7 @@ def _draw(
         "peak_force": {r.name: float(np.abs(r.force).max()) for r in clean},
         "held_out": clean[-1].name,
         "mesh": list(mesh),
-    }
+    } | more
     return Probing(name, "reduced-polynomial-2", lobe, noisy, noise, key)
 
 

@@ -53,6 +53,9 @@ says what simpler ways of answering would have said on the same cases.
         parser.add_argument(
             "--pairs", action="store_true", help="make: probings with two effects each, strong ones that can be seen"
         )
+        parser.add_argument(
+            "--rest", action="store_true", help="make: probings with a rest in the force that no catalogue has"
+        )
         parser.add_argument("--jobs", "-j", type=int, default=1, metavar="N", help="make, run: processes (default 1)")
         parser.add_argument("--case", action="append", default=[], metavar="NAME", help="run: only this case (repeat)")
         parser.add_argument("--again", action="store_true", help="run: diagnose again what has a result")
@@ -62,7 +65,7 @@ says what simpler ways of answering would have said on the same cases.
         """Do one of the four."""
         positive(given.jobs, "--jobs")
         if given.action == "make":
-            which = {"strong": given.strong, "pairs": given.pairs, "commit": given.commit}
+            which = {"strong": given.strong, "pairs": given.pairs, "rest": given.rest, "commit": given.commit}
             made = make(given.folder, given.kind, given.count, given.seed, given.jobs, for_terminal(), **which)
             text = (
                 f"{len(made['cases'])} {given.kind} cases in {given.folder}\nkeys sealed, sha256 {made['keys_sha256']}"
