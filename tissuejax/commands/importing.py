@@ -8,12 +8,16 @@ from typing import ClassVar
 
 from tissuejax.commands.command import Command, Reply
 from tissuejax.errors import InputError
+from tissuejax.mesh import probing_files
+from tissuejax.mesh.probing_files import describes_a_body, probing_sample
 from tissuejax.recordings.files import names, read, write
 from tissuejax.recordings.guessing import Guess, guessed
 from tissuejax.recordings.remarks import remarks
 from tissuejax.recordings.side_writing import side_text, template
 from tissuejax.storage import write_text
 
+# The example at the top of mesh/probing_files.py is the template: there is one text to keep right.
+PROBE = "\n".join(line[4:] for line in probing_files.__doc__.splitlines() if line.startswith("    ")) + "\n"
 SIZES = ("height", "diameter", "width", "thickness", "area", "radius")
 
 
@@ -37,6 +41,7 @@ machines, rheometers and indenters are recognised by their content.
 
   tissuejax import --template tension                      an empty side file to fill in (also compression, planar,
                                                            equibiaxial, biaxial, simple-shear, probing, probe)
+  tissuejax import probe.toml                              a probing: surface (STL), probe path, force, markers
   tissuejax import my.toml my.h5                           a recording file (HDF5) from a side file
   tissuejax import specimens.toml out/                     one recording file for each sample of it
 """
@@ -69,13 +74,15 @@ machines, rheometers and indenters are recognised by their content.
             return _template(given)
         if given.file is None:
             raise InputError("found no FILE: give a table, a raw export or a side file, or --template KIND")
+        if given.file.lower().endswith(".toml") and Path(given.file).is_file() and describes_a_body(Path(given.file)):
+            return _probed(given)
         if given.file.partition("#")[0].lower().endswith((".toml", ".h5", ".hdf5", ".yaml", ".yml")):
             return _converted(given)
         return _guessed(given)
 
 
 def _template(given: argparse.Namespace) -> Reply:
-    text = template(given.template)
+    text = PROBE if given.template == "probe" else template(given.template)
     out = given.out or (Path(given.file) if given.file else None)
     if out is None:
         return Reply({"template": text}, text.rstrip())
@@ -126,6 +133,23 @@ def _said(guess: Guess, side: Path, given: argparse.Namespace) -> Reply:
         lines.append(f"wrote {given.out}")
     lines += [f"look   tissuejax inspect {told} --out look", f"fit    tissuejax fit {told} --energy neo-hookean"]
     return Reply(record, "\n".join(lines))
+
+
+def _probed(given: argparse.Namespace) -> Reply:
+    side = Path(given.file)
+    out = given.out or side.with_suffix(".h5")
+    if out.suffix not in (".h5", ".hdf5"):
+        raise InputError(f"{out}: expected a recording file (.h5) to write")
+    _free(out, given.force)
+    sample = probing_sample(side)
+    write(sample, out)
+    found = remarks(sample)
+    lines = [sample.notes.replace(". ", ".\n"), *(f"note: {remark}" for remark in found), f"wrote {out}"]
+    told = shlex.quote(str(out))
+    lines += [f"look   tissuejax inspect {told} --out look"]
+    lines += [f"fit    tissuejax fit {told} --energy reduced-polynomial-2 --volumetric quadratic"]
+    written = {sample.name: {"file": str(out), "recordings": len(sample.recordings)}}
+    return Reply({"written": written, "notes": sample.notes, "remarks": found}, "\n".join(lines))
 
 
 def _converted(given: argparse.Namespace) -> Reply:

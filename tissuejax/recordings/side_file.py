@@ -121,6 +121,11 @@ def parse(path: Path) -> SideFile:
         content = tomllib.loads(path.read_text("utf-8-sig"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: found text that is not TOML ({error}), expected a side file") from error
+    if "body" in content:
+        raise InputError(
+            f"{path}: describes a probing of a body, which has to be meshed: `tissuejax import {path}` makes a "
+            "recording file (.h5) of it"
+        )
     for key in content:
         if key not in PART and key not in WHOLE:
             raise InputError(f"{path}: {unknown('key', key, [*PART, *WHOLE])}")
