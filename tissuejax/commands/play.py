@@ -1,4 +1,4 @@
-"""`tissuejax play`: a surrogate in the browser, in a haptic loop, beside a recording, or as one file to give away."""
+"""`tissuejax play`: feel and see a probing at the speed of a hand, replay a recording, give a model away as a file."""
 
 import argparse
 import asyncio
@@ -6,14 +6,26 @@ import contextlib
 from pathlib import Path
 from typing import ClassVar
 
+import h5py
+import numpy as np
+
 from tissuejax.commands.command import Command, Reply
-from tissuejax.commands.precompute import told
+from tissuejax.commands.precompute import counts_of, place_of, told
+from tissuejax.commands.tissue_given import Tissue, add_tissue, lobe_of, model_of_record, tissue
 from tissuejax.errors import InputError
-from tissuejax.play import blob, page
+from tissuejax.play import blob, haply, haptics, page, replay
+from tissuejax.play.direct_session import DirectSession
+from tissuejax.play.guard import Guard
 from tissuejax.play.server import Server
-from tissuejax.play.session import SurrogateSession
+from tissuejax.play.session import Session, SurrogateSession
+from tissuejax.play.stored import Run, RunSession
+from tissuejax.recordings.files import read
 from tissuejax.surrogate import store
+from tissuejax.surrogate.live import flat
 from tissuejax.surrogate.live.ask import Asker
+from tissuejax.surrogate.live.direct import Direct, keeps_up
+from tissuejax.surrogate.precompute import Precomputed
+from tissuejax.surrogate.site_mesh import Grid
 
 
 class Play(Command):
@@ -23,36 +35,131 @@ class Play(Command):
     order: ClassVar[int] = 46
     summary: ClassVar[str] = "feel and see a probing at the speed of a hand"
     teaches: ClassVar[str] = """
-Plays a surrogate (`tissuejax precompute`). Without an option it serves a page on this machine: drag the probe, press
-with the wheel, see the force, the relaxation, the inside.
+Plays a surrogate (`tissuejax precompute`), a stored run, or the full model. Without an option it serves a page on this
+machine: drag the probe, press with the wheel, see the force, the relaxation, the inside.
 
-  tissuejax play organ.play.h5                                  open the address that is printed
-  tissuejax play organ.play.h5 --export page.html               one file with the model inside, no server, no network
+  tissuejax play organ.play.h5                                     open the address that is printed
+  tissuejax play organ.play.h5 --export page.html                  one file with the model inside, no server needed
+  tissuejax play organ.play.h5 --export organ.tjf                  the force for C (tissuejax_force.h comes beside it)
+  tissuejax play organ.play.h5 --replay organ.h5 --recording r3 --json    force and markers against a recording
+  tissuejax play organ.play.h5 --haptics udp:9870 --seconds 60     a loop of 1000 forces a second for a device
+  tissuejax play organ.play.h5 --haptics haply                     the same, for the Haply service on this machine
+  tissuejax play --direct out/fit --sample organ.h5                TLED in the loop: any place, any effect
+  tissuejax play run.h5                                            a stored run, its states and its force
+
+A loop without permission for real-time priority runs and says so. A direct scene slower than life is refused.
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
-        """FILE and what to do with it."""
-        parser.add_argument("file", nargs="?", type=Path, metavar="FILE", help="of `tissuejax precompute`")
-        parser.add_argument("--export", type=Path, metavar="FILE", help="write a page.html that works alone")
+        """What is played, and how."""
+        add_tissue(parser)
+        parser.add_argument("--direct", action="store_true", help="SOURCE as for precompute; simulate in the loop")
+        parser.add_argument("--site", metavar="X,Y", help="with --direct: where the mesh is fine, mm")
+        parser.add_argument("--mesh", default="12x12x4", metavar="AxBxC", help="with --direct (default 12x12x4)")
+        parser.add_argument("--depth", type=float, default=7.0, metavar="MM", help="with --direct: of the wheel")
+        parser.add_argument("--export", type=Path, metavar="FILE", help="write page.html or model.tjf")
+        parser.add_argument("--replay", metavar="FILE", help="recording file; with --recording NAME")
+        parser.add_argument("--haptics", metavar="WHERE", help="udp:PORT, haply, or none (a hand that moves by itself)")
+        parser.add_argument("--rate", type=float, default=1000.0, metavar="HZ", help="of the loop (default 1000)")
+        parser.add_argument("--force-limit", type=float, default=3.0, metavar="N", help="default 3")
+        parser.add_argument("--slew-limit", type=float, default=300.0, metavar="N/S", help="default 300")
         parser.add_argument("--port", type=int, default=8765, metavar="N", help="of the page (default 8765)")
         parser.add_argument("--seconds", type=float, metavar="S", help="stop after so long (default: at Ctrl-C)")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Do it."""
-        if given.file is None:
-            raise InputError("which FILE? make one with `tissuejax precompute`")
-        made = store.read(given.file)
-        model = blob.of_surrogate(made, told(made.record)[1:])
+        if given.direct:
+            return _direct(given)
+        if given.source is None:
+            raise InputError("which FILE? make one with `tissuejax precompute`, or use --direct")
+        if _is_run(given.source):
+            return serve(RunSession(Run(given.source), Path(given.source).stem), given)
+        made = store.read(given.source)
         if given.export is not None:
-            if given.export.suffix != ".html":
-                raise InputError(f"--export {given.export}: wanted is a name that ends in .html")
-            path = page.export(model, given.export)
-            size = path.stat().st_size
-            return Reply({"page": str(path), "bytes": size}, f"page     {path} ({size / 1e6:.1f} MB)")
-        return serve(SurrogateSession(model, Asker(made.surrogate)), given)
+            return _export(made, given)
+        if given.haptics is not None:
+            return _haptics(made, given)
+        if given.replay is not None and given.json:
+            return _replayed(made, given)
+        return serve(SurrogateSession(_model(made, given), Asker(made.surrogate)), given)
 
 
-def serve(session, given: argparse.Namespace) -> Reply:
+def _is_run(path: str) -> bool:
+    try:
+        with h5py.File(path) as file:
+            return "states" in file and "channels" in file
+    except OSError:
+        return False
+
+
+def _sample(given: argparse.Namespace):
+    sample = read(given.replay)
+    name = given.recording or next((n for n, r in sample.recordings.items() if r.experiment == "probing"), "")
+    if name not in sample.recordings or sample.recordings[name].experiment != "probing":
+        raise InputError(f"--recording {name}: {given.replay} has {', '.join(sample.recordings)}; name a probing")
+    return sample, name, None if sample.geometry is None else lobe_of(sample)
+
+
+def _model(made: Precomputed, given: argparse.Namespace) -> dict:
+    beside = None
+    if given.replay is not None:
+        sample, name, lobe = _sample(given)
+        beside = replay.for_page(made.surrogate, sample.recordings[name], lobe)
+    return blob.of_surrogate(made, told(made.record)[1:], beside)
+
+
+def _export(made: Precomputed, given: argparse.Namespace) -> Reply:
+    if given.export.suffix == ".tjf":
+        path = flat.write(made.surrogate, given.export)
+        from tissuejax.storage import write_bytes
+        from tissuejax.surrogate.live.compiler import source
+
+        header = write_bytes(path.with_name("tissuejax_force.h"), source("tissuejax_force.h").read_bytes())
+        record = {"model": str(path), "header": str(header), "bytes": path.stat().st_size}
+        return Reply(record, f"model    {path}\nheader   {header}")
+    if given.export.suffix != ".html":
+        raise InputError(f"--export {given.export}: wanted is a name that ends in .html or .tjf")
+    path = page.export(_model(made, given), given.export)
+    size = path.stat().st_size
+    return Reply({"page": str(path), "bytes": size}, f"page     {path} ({size / 1e6:.1f} MB)")
+
+
+def _haptics(made: Precomputed, given: argparse.Namespace) -> Reply:
+    seconds = 60.0 if given.seconds is None else given.seconds
+    if given.haptics == "haply":
+        s = made.surrogate
+        middle = (np.asarray(s.low) + np.asarray(s.high)) / 2
+        centre = np.append(middle, s.touch.sample(middle[None])[0, 0])
+        guard = Guard(given.force_limit, given.slew_limit)
+        record = asyncio.run(haply.follow(Asker(s), guard, centre, seconds))
+        return Reply(record, f"{record['answered']} forces at {record['rate_Hz']:.0f} Hz; not real time (Python)")
+    port = haptics.port_of(given.haptics)
+    found = haptics.loop(made.surrogate, port, seconds, given.rate, given.force_limit, given.slew_limit)
+    return Reply(found.record, haptics.told(found.record))
+
+
+def _replayed(made: Precomputed, given: argparse.Namespace) -> Reply:
+    sample, name, lobe = _sample(given)
+    model, values = model_of_record(made.record["model"])
+    record = replay.compared(made.surrogate, sample, name, lobe, model, values)
+    return Reply(record, str(record))
+
+
+def _direct(given: argparse.Namespace) -> Reply:
+    what: Tissue = tissue(given)
+    place = what.site if given.site is None else place_of(given.site)
+    grid = Grid(counts_of(given.mesh), what.matter.radius)
+    direct = Direct(what.matter, grid, place)
+    pace = keeps_up(direct.pace(), grid)
+    if given.seconds == 0:
+        return Reply(
+            {"pace": pace._asdict()}, f"{pace.times_life:.1f} times life, a call {pace.call_p99_ms:.2f} ms (p99)"
+        )
+    title = "slab" if what.sample is None else what.sample.name
+    return serve(DirectSession(direct, pace, place, given.depth / 1e3, title, "the full model in the loop"), given)
+
+
+def serve(session: Session, given: argparse.Namespace) -> Reply:
     """The page's server, until the time is over or Ctrl-C."""
 
     async def main() -> Server:

@@ -60,7 +60,7 @@ command is given again. Softening, a moving or sliding base and escaping fluid c
         if given.all:
             low, high = whole_top(matter.lobe, matter.radius)
         else:
-            middle = what.site if given.site is None else _pair(given.site)
+            middle = what.site if given.site is None else place_of(given.site)
             low, high = middle - given.reach / 1e3, middle + given.reach / 1e3
         if not given.spacing > 0 or given.depths < 4:
             raise InputError(f"--spacing {given.spacing}, --depths {given.depths}: wanted are over 0 mm and at least 4")
@@ -71,7 +71,7 @@ command is given again. Softening, a moving or sliding base and escaping fluid c
         keep = out.with_name(out.name + ".sites")
         wanted = None if given.error is None else given.error / 100
         made = precompute(
-            matter, box, Grid(_counts(given.mesh), matter.radius), wanted, keep, for_terminal(), given.processes
+            matter, box, Grid(counts_of(given.mesh), matter.radius), wanted, keep, for_terminal(), given.processes
         )
         made.record["sample"] = name
         store.write(made, out)
@@ -103,7 +103,8 @@ def told(record: dict) -> list[str]:
     return lines
 
 
-def _pair(text: str) -> np.ndarray:
+def place_of(text: str) -> np.ndarray:
+    """`12,8` in mm as metres."""
     try:
         x, y = (float(part) / 1e3 for part in text.split(","))
     except ValueError:
@@ -111,7 +112,8 @@ def _pair(text: str) -> np.ndarray:
     return np.array([x, y])
 
 
-def _counts(text: str) -> tuple[int, int, int]:
+def counts_of(text: str) -> tuple[int, int, int]:
+    """`16x16x6` as numbers of elements."""
     try:
         nx, ny, nz = (int(part) for part in text.split("x"))
     except ValueError:

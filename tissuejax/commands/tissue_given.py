@@ -14,6 +14,7 @@ from tissuejax.experiments.homogeneous import local
 from tissuejax.experiments.probing_setup import site
 from tissuejax.mesh.cloud import lobe_of_cloud
 from tissuejax.mesh.columns import Lobe, box, lobe_of_mesh, top_of
+from tissuejax.model import Model
 from tissuejax.recordings.files import read
 from tissuejax.recordings.recording import Sample
 from tissuejax.surrogate.ramp import Matter
@@ -123,3 +124,12 @@ def _model(given):
     if record["status"] != "converged" and not given.anyway:
         raise InputError(f"{path}: the fit did not converge ({record['status']}); fit on, or say --anyway")
     return model, found
+
+
+def model_of_record(record: dict) -> tuple[Model, dict[str, float]]:
+    """The model and its values from what a surrogate's file says."""
+    model = verbs.material(
+        record["energy"], ogden_form=record["forms"].get("ogden"), volumetric=record["volumetric"] or "quadratic",
+        effects=record["effects"],
+    )  # fmt: skip
+    return model, dict(record["values"])

@@ -1,0 +1,166 @@
+"""The full model in the loop: explicit TLED a piece of life a call, its state carried on. For whatever has no table.
+
+Life is simulated at the speed of life; a scene that can't keep up is refused, with its pace and the largest mesh that
+would: slow motion raises the force (the tissue sees a faster hand), and must never happen unsaid.
+"""
+
+import time
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from tissuejax.errors import InputError, UnstableSimulation
+from tissuejax.experiments.probing import assembled
+from tissuejax.surrogate.ramp import Matter, bare_setup
+from tissuejax.surrogate.site_mesh import Grid, geometry, topology
+from tissuejax.tled.scene import Scene
+from tissuejax.tled.simulate import COMPILER_OPTIONS
+from tissuejax.tled.step import Drive, Machine, State, advance, machine
+from tissuejax.tled.step import start as begin
+
+CALL = 1e-3  # s of life a call, at least one step
+SLOWEST = 1.25  # times life that a scene must reach: the page and the machine want something too
+
+
+class Pace(NamedTuple):
+    """`times_life`: seconds of life in a second of one core; `call_ms`: p50 and p99 of a call; `contact_share`: of a
+    step that contact costs."""
+
+    times_life: float
+    call_p50_ms: float
+    call_p99_ms: float
+    contact_share: float
+    elements: int
+    step_ms: float
+
+
+@jax.jit
+def _machine(scene: Scene) -> tuple[Machine, State]:
+    made = machine(scene)
+    return made, begin(made)
+
+
+def _go(made: Machine, state: State, from_: Float[jax.Array, "3"], to: Float[jax.Array, "3"], steps: int):
+    def one(state, share):
+        centre = from_ + (to - from_) * share
+        state, felt = advance(made, state, Drive(centre, (to - from_) / steps, None))
+        return state, felt.force
+
+    state, forces = jax.lax.scan(one, state, (jnp.arange(steps) + 1.0) / steps)
+    return state, jnp.mean(forces, 0)
+
+
+def _calling(made: Machine, steps: int):
+    """A call of so many steps. The machine is built in: handing its hundred arrays over would cost more than a step."""
+    return jax.jit(lambda state, a, b: _go(made, state, a, b, steps), compiler_options=COMPILER_OPTIONS)
+
+
+def direct_scene(matter: Matter, grid: Grid, place) -> Scene:
+    """The scene of a fixed mesh, fine about `place`, with everything the model has, at the speed of life.
+
+    Raises:
+        InputError: a support that moves by itself: its clock is a recording's, not the hand's.
+    """
+    body = geometry(matter.lobe, place, grid)
+    _, _, patch = topology(grid)
+    setup = bare_setup(matter, body, patch, place, float(body.points[:, 2].max()) + matter.radius)
+    scene, _ = assembled(matter.model, {k: jnp.asarray(float(v)) for k, v in matter.values.items()}, setup)
+    if scene.support.displacement is not None:
+        raise InputError("a support that moves by itself follows a recording's clock; use `tissuejax simulate`")
+    return scene.put({"probe.offset": None}).cast(jnp.float32)
+
+
+class Direct:
+    """TLED under a hand.
+
+    Attributes:
+        call: s of life that one call covers. force: N, mean over the last call. displacement: of the nodes, m.
+    """
+
+    def __init__(self, matter: Matter, grid: Grid, place):
+        self.scene = direct_scene(matter, grid, place)
+        self.step = float(self.scene.clock.step)
+        self.steps = max(1, int(np.ceil(CALL / self.step - 1e-9)))
+        self.call = self.steps * self.step
+        made, self.state = _machine(self.scene)
+        self.go = _calling(made, self.steps)
+        self.first, self.force = self.state, np.zeros(3)
+        self.at = np.asarray(self.scene.probe.position[0], float)
+
+    def rest(self) -> None:
+        """Rested tissue."""
+        self.state, self.force = self.first, np.zeros(3)
+
+    def move(self, to: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+        """One call: the ball goes straight to `to`; the mean force on it, N.
+
+        Raises:
+            UnstableSimulation: the state is no longer finite; it is set back to rest.
+        """
+        a, b = (np.asarray(x, np.float32) for x in (self.at, to))
+        self.state, force = self.go(self.state, a, b)
+        self.force, self.at = np.asarray(force, float), np.asarray(to, float)
+        if not np.isfinite(self.force).all():
+            self.rest()
+            raise UnstableSimulation(
+                "the simulation broke down (pressed too fast or too deep) and was set back to rest"
+            )
+        return self.force
+
+    @property
+    def displacement(self) -> Float[np.ndarray, "N 3"]:
+        """Of the nodes, m."""
+        return np.asarray(self.state.u).T
+
+    def pace(self, calls: int = 400, press: float = 2e-3) -> Pace:
+        """Measured: the ball is pressed in and held while calls are timed; then rested again."""
+        down = self.at - np.array([0, 0, 1e-3 + press])
+        for share in np.linspace(0, 1, 50):
+            self.move(self.at + (down - self.at) * share)
+        spent, cpu = [], time.process_time()
+        for _ in range(calls):
+            begun = time.perf_counter()
+            self.move(down)
+            spent.append(time.perf_counter() - begun)
+        cpu = (time.process_time() - cpu) / calls
+        without = self._without_contact(calls)
+        self.rest()
+        self.at = np.asarray(self.scene.probe.position[0], float)
+        ms = 1e3 * np.array(spent)
+        return Pace(
+            self.call / cpu, float(np.median(ms)), float(np.quantile(ms, 0.99)), float(max(0.0, 1 - without / cpu)),
+            len(self.scene.body.cells), 1e3 * self.step,
+        )  # fmt: skip
+
+    def _without_contact(self, calls: int) -> float:
+        bare = self.scene.put({"probe": None})
+        made, state = _machine(bare)
+        zero = jnp.zeros(3, jnp.float32)
+        go = _calling(made, self.steps)
+        go(state, zero, zero)
+        cpu = time.process_time()
+        for _ in range(calls):
+            state, force = go(state, zero, zero)
+            force.block_until_ready()
+        return (time.process_time() - cpu) / calls
+
+
+def keeps_up(pace: Pace, grid: Grid) -> Pace:
+    """`pace`, if the scene is quick enough.
+
+    Raises:
+        InputError: it is not: its pace, and the largest mesh that would do.
+    """
+    if pace.times_life >= SLOWEST:
+        return pace
+    # a step costs as its elements, and its length falls with their size: work grows as the fourth power of the fineness
+    share = (pace.times_life / SLOWEST) ** 0.25
+    fits = tuple(max(2, int(share * n)) for n in grid.counts)
+    fits = (2 * (fits[0] // 2), 2 * (fits[1] // 2), fits[2])
+    raise InputError(
+        f"{pace.elements} elements run at {pace.times_life:.2f} times life here, {SLOWEST:g} are needed, and slow "
+        f"motion would falsify the force: take --mesh {fits[0]}x{fits[1]}x{fits[2]} or coarser, or a lower bulk modulus"
+    )
