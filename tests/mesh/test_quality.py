@@ -7,6 +7,7 @@ import trimesh
 
 from tissuejax.errors import InputError
 from tissuejax.mesh.columns import box
+from tissuejax.mesh.files import read_mesh
 from tissuejax.mesh.quality import quality, refuse_bad
 from tissuejax.mesh.tetrahedra import fill
 from tissuejax.recordings.recording import Geometry
@@ -74,3 +75,22 @@ def test_open_surface_is_refused():
     sphere.update_faces(np.arange(len(sphere.faces)) > 0)
     with pytest.raises(InputError, match="not closed: 3 open edges"):
         fill(sphere, edge=0.006)
+
+
+def test_a_surface_in_other_units_is_refused_before_it_is_meshed():
+    with pytest.raises(InputError, match="6.4 m long; expected between"):
+        fill(trimesh.creation.icosphere(subdivisions=1, radius=3.2), edge=0.5)
+
+
+def test_a_surface_mesh_leads_to_the_way_to_fill_it(tmp_path):
+    path = tmp_path / "organ.stl"
+    trimesh.creation.icosphere(subdivisions=1, radius=0.02).export(path)
+    with pytest.raises(InputError, match=r"holds a surface \(triangle\).* tissuejax.mesh.tetrahedra.fill\(surface"):
+        read_mesh(path)
+
+
+def test_a_support_of_a_handful_of_nodes_is_refused():
+    g = box((0.04, 0.04, 0.02), (20, 20, 4))
+    few = g.fixed[[0, 1, 21]]
+    with pytest.raises(InputError, match=r"holds 3 of 2205 nodes, 0.00% of the surface: next to nothing"):
+        refuse_bad(Geometry(g.points, g.cells, g.cell_type, few))

@@ -1,6 +1,7 @@
 """The prediction of probings: neutral effects, derivatives, invariances, rest of markers, refusals."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import jax
 import numpy as np
@@ -15,6 +16,7 @@ from tissuejax.experiments.probing import Simulated, assembled
 from tissuejax.experiments.probing_predictor import ProbingPredictor, _linearised, _vector
 from tissuejax.experiments.probing_sensors import rest_positions
 from tissuejax.experiments.probing_settings import ProbingSettings
+from tissuejax.fitting import advice
 from tissuejax.recordings.recording import Channel
 
 PRECISE = replace(QUICK, precision="float64")
@@ -232,3 +234,21 @@ def test_missing_radius_and_bad_settings():
         predictor(model(), sample(), compresion=3)
     with pytest.raises(InputError, match="must be positive"):
         ProbingSettings(step=0.0)
+
+
+def test_a_prediction_tells_how_its_simulation_went(plain):
+    """Shares of the hourglass control, of penetration and of inertia; all small in this quiet probing."""
+    checks = {k.removeprefix("numerics/"): v for k, v in plain.attributes.items() if k.startswith("numerics/")}
+    assert set(checks) == {"hourglass", "penetration", "inertia"}
+    assert 0 < checks["penetration"] < 0.05
+    assert 0 < checks["inertia"] < 0.05
+    assert checks["hourglass"] > 0
+
+
+def test_numerical_checks_above_five_per_cent_are_warnings():
+    told = SimpleNamespace(numerics={"r1": {"hourglass": 0.08, "penetration": 0.01}, "r2": {"hourglass": 0.03}})
+    assert advice._numerics(told) == [
+        "In the simulation of r1 8% of the strain energy is that of the hourglass control: take a finer mesh."
+    ]
+    assert advice.numerics_sentence(told).startswith("Simulations at worst: hourglass 8.00%, penetration 1.00%")
+    assert advice.numerics_sentence(SimpleNamespace(numerics={})) == ""

@@ -24,16 +24,25 @@ class Element(eqx.Module):
     """A solid element with one stress point.
 
     Class data:
-        name: as meshio calls the cell type.
+        name: of the element; where `cell_type` says nothing, as meshio calls its cells.
+        cell_type: as meshio calls the cells of an element that shares them with another.
         corners: reference coordinates of the nodes.
         faces: local nodes of each face, normal outward.
         averaged_pressure: True where the volumetric energy is taken at the nodes.
+        natural_hourglass: hourglass stiffness over shear modulus that is taken where none is given.
     """
 
     name: ClassVar[str]
+    cell_type: ClassVar[str | None] = None
     corners: ClassVar[np.ndarray]
     faces: ClassVar[tuple[tuple[int, ...], ...]]
     averaged_pressure: ClassVar[bool] = False
+    natural_hourglass: ClassVar[float] = 0.3
+
+    @property
+    def cells(self) -> str:
+        """What meshio calls the cells."""
+        return self.cell_type or self.name
 
     @property
     def nodes(self) -> int:

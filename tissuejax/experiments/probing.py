@@ -62,6 +62,8 @@ class Simulated(NamedTuple):
         channels: "force" (n, 3) N and "markers" (m, k, 3) m at the sensors' times; NaN throughout if the run failed.
         failed, element: -1, or the frame by which the run broke down and the element.
         inertia: greatest kinetic over greatest internal energy. depth: greatest penetration, m.
+        pierced: -1, or the frame by which the surface was too deep in the probe (`tled.contact.PIERCED`).
+        hourglass: greatest energy of the hourglass control over the greatest internal energy.
         ballast: mass added to hold the step, over the mass of the body.
         displacement: of the nodes at the end, m.
     """
@@ -73,6 +75,8 @@ class Simulated(NamedTuple):
     depth: Float[Array, ""]
     ballast: Float[Array, ""]
     displacement: Float[Array, "N 3"] | None = None
+    pierced: Int[Array, ""] | int = -1
+    hourglass: Float[Array, ""] | float = 0.0
 
 
 def assembled(model: Model, values: Mapping[str, Array], setup: Setup) -> tuple[Scene, Float[Array, ""]]:
@@ -135,9 +139,13 @@ def simulated(model: Model, values: Mapping[str, Array], setup: Setup) -> Simula
     for effect in reversed(model.ordered):
         channels = effect.channels(under(f"effects.{effect.name}", values), setup.test, channels)
     times = {"force": setup.force_times, "markers": setup.marker_times}
-    poison = jnp.where(out.failed >= 0, jnp.nan, 0.0)  # a broken run must never look like a prediction
+    pierced = out.pierced(scene)
+    bad = (out.failed >= 0) | (pierced >= 0)
+    poison = jnp.where(bad, jnp.nan, 0.0)  # a broken run must never look like a prediction
     read = {name: read_at(times[name], ch.time, ch.values) + poison for name, ch in channels.items()}
-    return Simulated(read, out.failed, out.element, out.inertia, out.depth, ballast, out.state.u.T)
+    return Simulated(
+        read, out.failed, out.element, out.inertia, out.depth, ballast, out.state.u.T, pierced, out.hourglass
+    )
 
 
 def _about_rest(markers: Float[Array, "n k 3"], setup: Setup) -> Float[Array, "n k 3"]:

@@ -25,6 +25,7 @@ from tissuejax.experiments.probing_setup import Setup, retimed, setups
 from tissuejax.model import Model
 from tissuejax.parameters import Values
 from tissuejax.recordings.recording import Channel, Recording, Sample
+from tissuejax.tled.contact import PIERCED
 
 
 class ProbingPredictor(Predictor):
@@ -74,7 +75,7 @@ class ProbingPredictor(Predictor):
         Raises:
             UnstableSimulation: a run broke down (unless the values are traced: then the prediction is NaN).
         """
-        return {name: self._reported(name, out.channels) for name, out in self.run(values).items()}
+        return {name: self._reported(name, out) for name, out in self.run(values).items()}
 
     def run(self, values: Values) -> dict[str, Simulated]:
         """The simulations behind `predict`, with their checks."""
@@ -97,7 +98,7 @@ class ProbingPredictor(Predictor):
         recordings, tangents = {}, {path: {} for path in paths}
         for (name, part), (run, slopes) in zip(place, self._side_by_side(jobs), strict=True):
             self._refuse_failed(name, run)
-            recordings[name] = self._reported(name, run.channels)
+            recordings[name] = self._reported(name, run)
             for row, i in enumerate(part):
                 tangents[paths[i]][name] = {c: self.unpadded(name, c, slope[row]) for c, slope in slopes.items()}
         for name in self.names:
@@ -132,9 +133,18 @@ class ProbingPredictor(Predictor):
         if isinstance(run.failed, jax.core.Tracer):
             return
         finite = all(np.isfinite(v[..., 0]).any() for v in run.channels.values())
-        if int(run.failed) < 0 and finite:
+        if int(run.failed) < 0 and int(run.pierced) < 0 and finite:
             return
         setup = self.setups[name]
+        if int(run.failed) < 0 and int(run.pierced) >= 0:
+            probe, when = setup.scene.probe, float(setup.scene.clock.ends[int(run.pierced)])
+            at = [1e3 * np.interp(when, np.asarray(probe.time), axis) for axis in np.asarray(probe.position).T]
+            raise UnstableSimulation(
+                f"recording {name}: by t = {when:.3g} s the surface had sunk into the probe by more than {PIERCED:.0%} "
+                f"of its radius ({1e3 * float(run.depth):.2g} mm at worst), the probe at ({at[0]:.1f}, {at[1]:.1f}, "
+                f"{at[2]:.1f}) mm; raise the setting `penalty` (now {self.settings.penalty:.2g} Pa/m), or start from "
+                "softer parameters"
+            )
         cells = np.asarray(setup.scene.body.cells)
         x, y, z = 1e3 * np.asarray(setup.scene.body.points)[cells[int(run.element)]].mean(0)
         when = float(setup.scene.clock.ends[int(run.failed)])
@@ -144,13 +154,22 @@ class ProbingPredictor(Predictor):
             "more stable parameters"
         )
 
-    def _reported(self, name: str, channels: Mapping[str, Array]) -> Recording:
+    def _reported(self, name: str, run: Simulated) -> Recording:
+        """A prediction as a recording: the checks of its simulation are attributes `numerics/...`."""
         measured = self.sample.recordings[name]
         told = {
             c: Channel(measured.channels[c].time, self.unpadded(name, c, v), measured.channels[c].unit)
-            for c, v in channels.items()
+            for c, v in run.channels.items()
         }
-        return Recording(name, measured.experiment, measured.inputs, told, measured.attributes)
+        checks = {}
+        if not isinstance(run.depth, jax.core.Tracer):
+            deep = max(0.0, float(run.depth)) / float(self.setups[name].scene.probe.shape.radius)
+            checks = {
+                "numerics/hourglass": float(run.hourglass),
+                "numerics/penetration": deep,
+                "numerics/inertia": float(run.inertia),
+            }
+        return Recording(name, measured.experiment, measured.inputs, told, {**measured.attributes, **checks})
 
     def unpadded(self, name: str, channel: str, values: Array) -> Array:
         """Values as simulated, cut to the samples (and markers) that recording and channel have."""
@@ -171,7 +190,7 @@ def predict_all(predictors: Sequence[ProbingPredictor], values: Values) -> list[
         runs = {name: next(done) for name in p.names}
         for name, run in runs.items():
             p._refuse_failed(name, run)
-        told.append({name: p._reported(name, run.channels) for name, run in runs.items()})
+        told.append({name: p._reported(name, run) for name, run in runs.items()})
     return told
 
 

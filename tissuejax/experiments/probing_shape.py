@@ -56,6 +56,6 @@ def deformed(predictor: ProbingPredictor, values: Mapping[str, float], name: str
         simulated = np.asarray(out.channels["markers"], float)[frame, :count]
     return Deformed(
         name, when, np.asarray(body.points, float) + np.asarray(out.displacement, float),
-        boundary(np.asarray(body.cells), body.element.name).nodes, path[bottom].astype(float),
+        boundary(np.asarray(body.cells), body.element.cells).nodes, path[bottom].astype(float),
         float(setup.scene.probe.shape.radius), rest, measured, simulated,
     )  # fmt: skip

@@ -14,6 +14,12 @@ MISFIT = 1.5  # chi-square per sample from which the misfit is called larger tha
 SERIAL = 0.5  # lag-one correlation of residuals from which standard errors are called optimistic
 CONDITION = 1e6
 GROSS = 5.0  # misfit in units of the noise beyond which a fit describes something else
+COARSE = 0.05  # share from which a numerical check of a simulation is a warning
+CHECKS = {  # of a simulation: what the share is of, and what to do
+    "hourglass": ("of the strain energy is that of the hourglass control", "take a finer mesh"),
+    "penetration": ("of the probe's radius is sunk into the surface", "raise `penalty`"),
+    "inertia": ("of the strain energy is kinetic", "lower `compression`"),
+}
 
 
 def warnings_of(found: "Fit") -> list[str]:
@@ -43,7 +49,24 @@ def warnings_of(found: "Fit") -> list[str]:
             f"The noise was not recorded; it was estimated from the residuals: {text}. "
             "So chi-square says nothing on whether the model fits."
         )
-    return said + _starts(found)
+    return said + _numerics(found) + _starts(found)
+
+
+def _numerics(found: "Fit") -> list[str]:
+    said = []
+    for check, (what, remedy) in CHECKS.items():
+        shares = {name: checks[check] for name, checks in found.numerics.items() if check in checks}
+        worst = max(shares, key=shares.get, default=None)
+        if worst is not None and shares[worst] > COARSE:
+            said.append(f"In the simulation of {worst} {shares[worst]:.0%} {what}: {remedy}.")
+    return said
+
+
+def numerics_sentence(found: "Fit") -> str:
+    """One line on the numerical checks of a fit's simulations, the worst recording of each; empty without any."""
+    shares = {c: max((v[c] for v in found.numerics.values() if c in v), default=None) for c in CHECKS}
+    told = ", ".join(f"{check} {share:.2%}" for check, share in shares.items() if share is not None)
+    return f"Simulations at worst: {told} (of strain energy, of the probe's radius, of strain energy)." if told else ""
 
 
 def beyond_noise(found: "Fit") -> dict[str, float]:

@@ -19,6 +19,7 @@ from tissuejax.model import Model
 from tissuejax.recordings.recording import Recording
 
 FORMAT = 1
+NUMERICS = "numerics/"  # attributes of a simulated recording that say how its run went
 
 
 @dataclass(frozen=True)
@@ -114,6 +115,18 @@ class Fit:
         """Chi-square per degree of freedom."""
         return self.chi2 / max(1, self.problem.n_samples + len(self.problem.priors) - len(self.free))
 
+    @property
+    def numerics(self) -> dict[str, dict[str, float]]:
+        """For simulated recordings, the worst of each numerical check, as shares: energy of the hourglass control over
+        internal energy, penetration over the probe's radius, kinetic over internal energy."""
+        kept = {
+            name: {k: v for k, v in r.attributes.items() if k.startswith(NUMERICS)}
+            for name, r in self.predictions.items()
+        }
+        return {
+            name: {k[len(NUMERICS) :]: float(v) for k, v in checks.items()} for name, checks in kept.items() if checks
+        }
+
     def record(self) -> dict:
         """The contents of result.json."""
         model = self.problem.predictor.model
@@ -154,6 +167,7 @@ class Fit:
             "channels": {key: s.record() for key, s in self.channels.items()},
             "holdout": {key: s.record() for key, s in self.holdout.items()},
             **({"sites": self.sites} if self.sites else {}),
+            **({"numerics": checks} if (checks := self.numerics) else {}),
             "warnings": list(self.warnings),
             "starts": self.starts,
             "n_evaluations": self.n_evaluations,

@@ -20,7 +20,7 @@ def read_mesh(path: str | Path, scale: float = 1.0, support: float | None = None
         support: nodes at most this far above the lowest point are held, m; None takes a point set named "fixed".
 
     Raises:
-        InputError: an unreadable file, no hexes or tets in it, or both at once.
+        InputError: an unreadable file, a surface (with the way to fill it), no hexes or tets in it, or both at once.
     """
     try:
         mesh = meshio.read(path)
@@ -29,6 +29,12 @@ def read_mesh(path: str | Path, scale: float = 1.0, support: float | None = None
             f"{path}: meshio can't read it ({error}); give one of its formats (vtu, msh, inp, ...)"
         ) from error
     kinds = [k for k in ("hexahedron", "tetra") if k in mesh.cells_dict]
+    if not kinds and {"triangle", "quad"} & set(mesh.cells_dict):
+        raise InputError(
+            f"{path}: holds a surface ({', '.join(sorted(mesh.cells_dict))}), and a simulation needs its inside in "
+            f"hexes or tets. Fill it: surface = trimesh.load({str(path)!r}), surface.apply_scale(1e-3) if that is in "
+            "millimetres, then tissuejax.mesh.tetrahedra.fill(surface, edge=0.005, support=0.002)"
+        )
     if len(kinds) != 1:
         raise InputError(
             f"{path}: holds {sorted(mesh.cells_dict)}; expected either hexahedron or tetra cells; convert it"

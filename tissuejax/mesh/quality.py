@@ -8,8 +8,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tissuejax.errors import InputError
+from tissuejax.mesh.facets import area_vectors, boundary
 from tissuejax.recordings.recording import Geometry
 
+FOOT = 0.002  # share of the surface that a support must hold at least
 SMALLEST, LARGEST = 1e-3, 2.0  # m: an organ or specimen outside this has its units wrong
 CORNERS = {  # for each corner the three neighbours, right-handed
     "hexahedron": (
@@ -108,19 +110,14 @@ def refuse_bad(geometry: Geometry, needs_support: bool = True, joined: Int[np.nd
 
     Raises:
         InputError: an index out of range, a size that means wrong units, an inverted or flat cell, points in no cell,
-            a body in several pieces, no fixed node, or fixed nodes that let the body float.
+            a body in several pieces, no fixed node, or fixed nodes that let the body float or are a mere handful.
     """
     points, cells, fixed = (np.asarray(a) for a in (geometry.points, geometry.cells, geometry.fixed))
     if not len(cells) or cells.min() < 0 or cells.max() >= len(points):
         raise InputError(f"cells name nodes outside 0..{len(points) - 1} (or there are none); check the numbering")
     if not np.isfinite(points).all():
         raise InputError(f"point {int(np.argwhere(~np.isfinite(points))[0, 0])} is not finite; repair the mesh")
-    extent = np.ptp(points, axis=0).max()
-    if not SMALLEST <= extent <= LARGEST:
-        raise InputError(
-            f"the body is {extent:.4g} m long; expected between {SMALLEST} and {LARGEST} m. "
-            "Lengths are metres: were millimetres given as metres (or the reverse)?"
-        )
+    refuse_units(float(np.ptp(points, axis=0).max()))
     worst = corner_jacobians(points, cells, geometry.cell_type)
     bad = np.flatnonzero((worst.min(1) <= 1e-3) | (cell_volumes(points, cells, geometry.cell_type) <= 0))
     if len(bad):
@@ -146,7 +143,36 @@ def refuse_bad(geometry: Geometry, needs_support: bool = True, joined: Int[np.nd
         )
     if needs_support:
         _refuse_floating(points, fixed)
+        _refuse_handful(geometry, points, fixed)
     return quality(geometry)
+
+
+def refuse_units(extent: float) -> None:
+    """Refuse a body of a size that means wrong units: `extent` in m.
+
+    Raises:
+        InputError: it is shorter than `SMALLEST` or longer than `LARGEST`.
+    """
+    if not SMALLEST <= extent <= LARGEST:
+        raise InputError(
+            f"the body is {extent:.4g} m long; expected between {SMALLEST} and {LARGEST} m. "
+            "Lengths are metres: were millimetres given as metres (or the reverse)?"
+        )
+
+
+def _refuse_handful(geometry: Geometry, points, fixed) -> None:
+    """A support must be an area: a body that stands on a few nodes tears there, whatever holds it in reality."""
+    facets = boundary(geometry.cells, geometry.cell_type).nodes
+    area = np.linalg.norm(area_vectors(points, facets), axis=1)
+    on = np.isin(facets, fixed)
+    share = float(area[on.all(1)].sum() / area.sum())
+    nodes = float(on.any(1).sum() / len(facets))  # held nodes that fill no facet: edges, inner nodes
+    if share < FOOT and nodes < 10 * FOOT:
+        raise InputError(
+            f"the support holds {len(fixed)} of {len(points)} nodes, {share:.2%} of the surface: next to nothing, and "
+            "the tissue would tear there. Hold the nodes of the whole area that rests on something: a larger `support` "
+            "height, or turn the body so that it lies on its flat side"
+        )
 
 
 def _refuse_floating(points, fixed) -> None:

@@ -7,22 +7,32 @@ import numpy as np
 import trimesh
 
 from tissuejax.errors import InputError
+from tissuejax.mesh.quality import refuse_bad, refuse_units
 from tissuejax.recordings.recording import Geometry
 
 
-def fill(surface: trimesh.Trimesh, edge: float, support: float = 1e-4) -> Geometry:
+def fill(surface: trimesh.Trimesh, edge: float, support: float | None = None) -> Geometry:
     """A tet mesh of the inside of a closed surface.
+
+    Linear tets are stiff: 2 to 9 % more force under a ball than hexes of like size, 8 to 20 % in a clamped cube of
+    8 x 8 x 8 x 6, the more so the less compressible (Poisson's ratio 0.49 and more). Organs that are columns over their
+    base are better meshed by `mesh.columns` or `mesh.cloud` in hexes.
 
     Args:
         surface: watertight triangles, m.
         edge: target edge length, m.
-        support: nodes at most this far above the lowest point are held, m.
+        support: nodes at most this far above the lowest point are held, m; None is half an edge length.
 
     Raises:
-        InputError: a surface with holes (their number and the first place), or no tets inside.
+        InputError: a surface with holes (their number and the first place), of a size that means wrong units, an edge
+            or a support that is not positive, no tets inside, or a support that holds next to nothing.
     """
     import pytetwild  # a compiled generator, needed here only
 
+    refuse_units(float(surface.extents.max()))
+    support = 0.5 * edge if support is None else support
+    if not (edge > 0 and support >= 0):
+        raise InputError(f"edge {edge} m and support {support} m: an edge must be positive, a support not negative")
     if not surface.is_watertight:
         edges = surface.edges_sorted
         _, first, counts = np.unique(edges, axis=0, return_index=True, return_counts=True)
@@ -51,4 +61,7 @@ def fill(surface: trimesh.Trimesh, edge: float, support: float = 1e-4) -> Geomet
     cells[turned] = cells[turned][:, [0, 2, 1, 3]]
     used, cells = np.unique(cells, return_inverse=True)
     points = points[used]
-    return Geometry(points, cells.reshape(-1, 4), "tetra", np.flatnonzero(points[:, 2] <= points[:, 2].min() + support))
+    held = np.flatnonzero(points[:, 2] <= points[:, 2].min() + support)
+    made = Geometry(points, cells.reshape(-1, 4), "tetra", held)
+    refuse_bad(made)
+    return made

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from tissuejax import report as package
 from tissuejax.families import members
-from tissuejax.fitting.advice import suspect
+from tissuejax.fitting.advice import numerics_sentence, suspect
 from tissuejax.fitting.result import Fit
 from tissuejax.report import sentences
 from tissuejax.report.fit_tables import write_curves, write_latex
@@ -90,6 +90,7 @@ def write_fit(found: Fit, out: Path, pictures: bool = True) -> dict[str, Path]:
         parameters=sentences.table(found),
         errors=sentences.errors(found),
         sites=sentences.sites(found),
+        numerics=numerics_sentence(found),
         figures=drawn,
     )
     written["page"] = write_text(out / "report.html", page)

@@ -1,8 +1,8 @@
 """From a mesh, a material and a probe path to a `Scene`: the choices that are made once, on the host.
 
-Step: `SAFETY` times the critical step at the given parameters (give the stiffest ones that a fit may visit). Penalty:
-see `automatic_penalty`. Patch: facets that the probe can come near. What can't work is refused here, once, with a
-sentence.
+Step: `SAFETY` times the critical step at the given parameters (give the stiffest ones that a fit may visit), and no
+longer than the tissue allows once the probe has pressed it (`pressed`). Penalty: see `automatic_penalty`. Patch: facets
+that the probe can come near. What can't work is refused here, once, with a sentence.
 """
 
 import math
@@ -14,6 +14,7 @@ from jaxtyping import Array, Float, Int
 
 from tissuejax import elements
 from tissuejax.elements.hex8 import Hex8, straight
+from tissuejax.elements.hex8_bending import Hex8Bending
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.volumetric import Volumetric
 from tissuejax.errors import InputError
@@ -21,19 +22,21 @@ from tissuejax.families import lookup, members
 from tissuejax.mesh.facets import area_vectors, boundary
 from tissuejax.mesh.quality import refuse_bad
 from tissuejax.recordings.recording import Geometry
+from tissuejax.tled import pressed
 from tissuejax.tled.contact import quadrature
 from tissuejax.tled.scene import Body, Clock, Markers, Probe, Scene, Settings, Support, Tissue
 from tissuejax.tled.shapes import Hemisphere, Platen, Shape, Sphere
 from tissuejax.tled.stable import critical_steps
 
 SAFETY = 0.7
+SQUEEZED = 0.9  # the same for elements as short as the probe will make them: few are, and waves need several
 YIELD = 500.0  # a pressure of one shear modulus pushes the surface into the probe by at most its radius over this
 ONSET = 0.1  # softness of contact over that penetration
 PATCH = 16  # patches are padded to a multiple of this, so that scenes of one mesh share a program
 
 
 def element(cell_type: str):
-    """The element for a meshio cell type.
+    """The element of a name: a meshio cell type, or one that shares its cells ("hexahedron-bending").
 
     Raises:
         InputError: no such element; the known ones are offered.
@@ -58,7 +61,7 @@ def scene(
     compression: float = 1.0,
     step: float | None = None,
     penalty: float | None = None,
-    hourglass: float = 0.3,
+    hourglass: float | None = None,
     mass_damping: float | None = None,
     stiffness_damping: float = 0.0,
     gravity: tuple[float, float, float] | None = None,
@@ -67,6 +70,8 @@ def scene(
     patch: Float[np.ndarray, "P v"] | None = None,
     softness: float | None = None,
     joined: Int[np.ndarray, "J 2"] | None = None,
+    settled: Float[np.ndarray, "N 3"] | None = None,
+    element_name: str | None = None,
 ) -> Scene:
     """A scene with every optional slot empty.
 
@@ -77,14 +82,16 @@ def scene(
         times: uniform output times (middles of the frames), real time, s.
         probe_time, probe_position, radius or shape: the probe; None for none.
         compression: factor f by which slow motion is run faster.
-        step: s on the simulated clock; None is `SAFETY` times the critical one.
+        step: s on the simulated clock; None is `SAFETY` times the critical one, less where the probe goes deep.
         penalty: Pa/m; None is automatic. softness: m; None is a tenth of the penetration (`automatic_penalty`).
-        hourglass: in units of the shear modulus (0.1 to 0.5).
+        hourglass: in units of the shear modulus; None is the element's own (0.3 for the plain hex; 0.1 to 0.5).
         mass_damping: 1/s; None is half the lowest shear frequency pi/2 c_s / height.
         stiffness_damping: beta, s; 5e-5 s for forward tangents of slow runs.
         gravity: m/s^2. markers: points to follow. held: which axes of the fixed nodes are held (all).
         patch: nodes of the facets that may touch (automatic).
         joined: pairs of nodes that cohesive faces hold together, so that both halves count as one body.
+        element_name: None is the plain one for the cells; "hexahedron-bending" where elements are long or bend.
+        settled: displacement at time zero, m, for example under gravity: where the probe finds the tissue.
 
     Raises:
         InputError: a bad mesh, a step above the critical one, a probe that starts inside the tissue or never comes
@@ -96,10 +103,13 @@ def scene(
     if not density > 0:
         raise InputError(f"density {density} kg/m^3: mass is needed by the explicit solver; tissue has about 1000")
     facets = boundary(geometry.cells, geometry.cell_type)
+    made = _element(geometry, element_name, energy, volumetric, energy_values, volumetric_values)
+    hourglass = made.natural_hourglass if hourglass is None else hourglass
     body = Body(
         jnp.asarray(geometry.points), jnp.asarray(geometry.cells, jnp.int32), jnp.asarray(geometry.fixed, jnp.int32),
         jnp.ones((len(geometry.fixed), 3)) if held is None else jnp.asarray(held, float),
-        jnp.asarray(facets.nodes, jnp.int32), _element(geometry),
+        jnp.asarray(facets.nodes, jnp.int32), made,
+        None if settled is None else jnp.asarray(settled, float),
     )  # fmt: skip
     tissue = Tissue(energy, volumetric, _floats(energy_values), _floats(volumetric_values), jnp.asarray(float(density)))
     if mass_damping is None:
@@ -110,16 +120,19 @@ def scene(
     clock = Clock(*(jnp.asarray(float(x)) for x in (times[0] - interval / 2, interval, compression)), len(times), 1)
     g = None if gravity is None else jnp.asarray(gravity, float)
     bare = Scene(body, tissue, clock, settings, Support(), None, markers, g)
-    bare = bare.put({"clock.steps": steps(bare, step)})
-    if probe_position is None:
+    shape = None if probe_position is None else _shape(shape, radius)
+    bare = bare.put({"clock.steps": steps(bare, step, shape, probe_position)})
+    if shape is None:
         return bare
-    shape = _shape(shape, radius)
-    facets = _patch(facets.nodes, geometry, shape, probe_time, probe_position) if patch is None else np.asarray(patch)
+    if patch is None:
+        patch = _patch(facets.nodes, _now(bare), geometry.fixed, shape, probe_position)
+    facets = np.asarray(patch)
     return bare.put({"probe": probe(bare, shape, probe_time, probe_position, facets, penalty, softness)})
 
 
-def steps(bare: Scene, step: float | None) -> int:
-    """Steps a frame: the given step, or the greatest that is safe.
+def steps(bare: Scene, step: float | None, shape: Shape | None = None, position=None) -> int:
+    """Steps a frame: the given step, or the greatest that is safe, also where a probe of that `shape` will have pressed
+    the tissue on its way through `position` (n, 3).
 
     Raises:
         InputError: a step above the critical one.
@@ -131,7 +144,13 @@ def steps(bare: Scene, step: float | None) -> int:
             f"step {step * 1e3:.4g} ms: the critical step is {critical * 1e3:.4g} ms (element {int(bounds.argmin())}); "
             "take a smaller step, less stiffness damping, or leave it to the program"
         )
-    step = SAFETY * critical if step is None else step
+    if step is None:
+        step = SAFETY * critical
+        if shape is not None:
+            points = _now(bare)
+            stretch = pressed.spread(bare, pressed.shortest_stretch(points, shape, position))
+            under = bounds[pressed.near(points, bare.body.cells, shape, position)].min()
+            step = min(step, SQUEEZED * float(under) / pressed.quickening(bare, stretch))
     return max(1, math.ceil(float(bare.clock.interval / bare.clock.compression) / step - 1e-9))
 
 
@@ -140,7 +159,7 @@ def probe(bare: Scene, shape: Shape, time, position, facets, penalty=None, softn
     time, position = np.asarray(time, float), np.asarray(position, float)
     points = np.asarray(bare.body.points)
     if penalty is None:
-        penalty = automatic_penalty(bare, shape, facets)
+        penalty = automatic_penalty(bare, shape, facets, position)
     if softness is None:
         softness = ONSET * _shear_modulus(bare) / penalty
     area = _areas(points, facets)
@@ -155,12 +174,15 @@ def probe(bare: Scene, shape: Shape, time, position, facets, penalty=None, softn
         jnp.asarray(time), jnp.asarray(position), shape, jnp.asarray(facets, jnp.int32), jnp.asarray(area),
         jnp.asarray(mass), jnp.asarray(float(penalty)), jnp.asarray(float(softness)),
     )  # fmt: skip
-    _refuse_inside(made, points, float(bare.clock.start))
+    _refuse_inside(made, _now(bare), float(bare.clock.start))
     return made
 
 
-def automatic_penalty(bare: Scene, shape: Shape, facets) -> float:
+def automatic_penalty(bare: Scene, shape: Shape, facets, position=None) -> float:
     """Pressure per penetration, Pa/m: mu / min(h^2 / (4 R), R / YIELD), mu the shear modulus, h the finest facets.
+
+    Along a path through `position`, mu is that of the tissue as it is compressed where the path is deepest
+    (`pressed.stiffening`): the modulus at rest for laws that do not stiffen under compression.
 
     The pressure under a probe is of the order of mu. A facet of size h is flat where the probe, of radius R, curves by
     h^2 / (4 R) from its corners to its middle. A penalty that allows less penetration than that holds nine points of a
@@ -173,6 +195,8 @@ def automatic_penalty(bare: Scene, shape: Shape, facets) -> float:
         raise InputError(f"shear modulus at rest {shear:.4g} Pa: no penalty follows from it; give `penalty` in Pa/m")
     size = math.sqrt(np.quantile(np.linalg.norm(area_vectors(points, facets), axis=1), 0.1))
     allowed = min(size**2 / (4 * reach), reach / YIELD) if math.isfinite(reach) else size / YIELD
+    if position is not None:
+        shear *= pressed.stiffening(bare, pressed.typical_stretch(_now(bare), shape, position))
     return shear / allowed
 
 
@@ -180,9 +204,18 @@ def _shear_modulus(bare: Scene) -> float:
     return float(bare.tissue.energy.initial_shear_modulus(bare.tissue.energy_values))
 
 
-def _element(geometry: Geometry):
-    made = element(geometry.cell_type)
-    return Hex8(straight(geometry.points, geometry.cells)) if isinstance(made, Hex8) else made
+def _element(geometry, name, energy, volumetric, energy_values, volumetric_values):
+    made = element(geometry.cell_type if name is None else name)
+    if made.cells != geometry.cell_type:
+        raise InputError(f"element {name!r} has cells of type {made.cells!r}, but the mesh {geometry.cell_type!r}")
+    if isinstance(made, Hex8):
+        return Hex8(straight(geometry.points, geometry.cells))
+    if isinstance(made, Hex8Bending):
+        bulk = float(volumetric.bulk_modulus(_floats(volumetric_values)))
+        shear = float(energy.initial_shear_modulus(_floats(energy_values)))
+        poisson = (3 * bulk - 2 * shear) / (2 * (3 * bulk + shear))
+        return Hex8Bending(round(min(max(poisson, 0.0), 0.5), 2))
+    return made
 
 
 def _floats(values: Mapping[str, float]) -> dict[str, Array]:
@@ -213,10 +246,15 @@ def _distance(shape, x):
     return np.asarray(gap)
 
 
-def _patch(nodes, geometry, shape, time, position):
+def _now(bare: Scene) -> np.ndarray:
+    """Where the nodes are when the clock starts."""
+    points, settled = np.asarray(bare.body.points), bare.body.settled
+    return points if settled is None else points + np.asarray(settled)
+
+
+def _patch(nodes, points, fixed, shape, position):
     """Facets some node of which comes within half a radius and a facet of the probe's path."""
-    points = np.asarray(geometry.points)
-    free = ~np.isin(nodes, geometry.fixed).all(1)
+    free = ~np.isin(nodes, fixed).all(1)
     vectors = area_vectors(points, nodes)
     if isinstance(shape, Platen):
         keep = free & (vectors[:, 2] > 0.2 * np.linalg.norm(vectors, axis=1))

@@ -18,6 +18,7 @@ from tissuejax.tled.internal import barrier
 from tissuejax.tled.scene import Probe, Scene
 
 BONDED = 4.0  # a point that comes as near as zero gap is bonded by 98 %, however lightly it is pressed
+PIERCED = 0.05  # penetration over the probe's radius from which contact no longer holds
 BREAK = 5.0  # gap over reach at which a bond is gone: exp(1 - 5) * 5 = 9 % of the greatest pull
 
 
@@ -129,6 +130,12 @@ def _friction(probe, x, normal, pressure, anchor):
     anchor = tuple(a - s for a, s in zip(x, kept_stretch, strict=True))
     lost = spring * square * kept * (1.0 - kept)  # traction times slide; none where nothing presses
     return tuple(-spring * s for s in kept_stretch), anchor, lost
+
+
+def breadth(scene: Scene) -> Float[Array, ""]:
+    """Radius of the probe, or a tenth of the body's height under one without (a platen), m."""
+    reach = jnp.asarray(scene.probe.shape.reach(), scene.body.points.dtype)
+    return jnp.where(jnp.isfinite(reach), reach, 0.1 * jnp.ptp(scene.body.points[:, 2]))
 
 
 def depth(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Array, " 3"]) -> Float[Array, ""]:

@@ -12,10 +12,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from tissuejax.errors import InputError
-from tissuejax.tled import statics
+from tissuejax.errors import InputError, NotConverged
+from tissuejax.tled import statics, verdict
 from tissuejax.tled.scene import Scene
 from tissuejax.tled.simulate import COMPILER_OPTIONS
+
+MISS = 1e-4  # of the body's height: gravity has brought the measured shape back
 
 
 class StressFree(NamedTuple):
@@ -86,3 +88,20 @@ def stress_free(scene: Scene, rounds: int = 12, tolerance: float = 1e-8) -> Stre
 
 
 compiled = jax.jit(stress_free, compiler_options=COMPILER_OPTIONS, static_argnames=("rounds",))
+
+
+def checked(found: StressFree, scene: Scene) -> StressFree:
+    """`found`, or the sentence that says why there is no stress-free shape of `scene` (host side).
+
+    Raises:
+        NotConverged: gravity could not be balanced, or did not bring the measured shape back.
+    """
+    size = float(jnp.ptp(scene.body.points[:, 2]))
+    if not bool(jnp.isfinite(found.miss)):
+        raise NotConverged("no stress-free shape: under gravity the tissue finds no rest. " + verdict.weight(scene))
+    if float(found.miss) > MISS * size:
+        raise NotConverged(
+            f"no stress-free shape: at the last round gravity misses the measured one by {1e3 * float(found.miss):.3g} "
+            "mm. Allow more rounds. " + verdict.weight(scene)
+        )
+    return found

@@ -6,13 +6,14 @@ What others build on (stable):
                         probe_position=..., radius=..., times=...)      # host: chooses step, penalty, patch; refuses
     scene = scene.put({"tissue.energy_values.C10": c, "probe.friction": 0.2, "tissue.stiffness": field})
     out = simulate(scene)                    # pure JAX: jit, jvp, vjp work from outside; the scene is a pytree argument
-    out = run(scene)                         # the same, jitted, and checked: raises UnstableSimulation
+    out = run(scene)                         # the same, jitted, and checked (`verdict`): raises UnstableSimulation
     force = sample(out.time, out.force, t)   # at the sensor's own times
 
 Compile with `jax.jit(f, compiler_options=COMPILER_OPTIONS)`: without these options the result is the same and 3 to 5
 times slower. Inside `simulate` every float is cast to the precision of `scene.body.points` (`scene.cast(float32)`).
 `out.failed` is a code, -1 if all is well, else the frame at which a value was not finite or an element inverted
-(`out.element`); `check(out, scene)` turns it into the sentence. Never use an outcome without looking at it.
+(`out.element`); `out.pierced(scene)` is the frame by which the probe had sunk through the surface. `verdict.check`
+turns both into sentences. Never use an outcome without looking at them.
 """
 
 import math
@@ -23,8 +24,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from tissuejax.errors import UnstableSimulation
-from tissuejax.tled import contact, internal
+from tissuejax.tled import contact, internal, verdict
 from tissuejax.tled.ledger import Balance, Spent, balance, look
 from tissuejax.tled.scene import Scene
 from tissuejax.tled.step import Drive, Felt, Machine, State, advance, machine, start
@@ -41,7 +41,7 @@ class Checks(NamedTuple):
     Attributes:
         kinetic, internal: energies, J (kinetic with the static mass of contact; internal: elastic, no memory).
         hourglass: energy of the hourglass control, J; more than some per cent of `internal`: too coarse.
-        depth: greatest penetration into the probe, m.
+        depth: greatest penetration into the probe at the end of any of the block's frames, m.
         failed: True where a value is not finite or an element is inverted; `element`: the worst of the finite ones.
     """
 
@@ -54,11 +54,13 @@ class Checks(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """Taken at the end of each frame: whether every speed is finite, and the node that moves fastest. A run that blows
-    up is full of NaN by the next look, so where it began is read off from the last frame that was still finite."""
+    """Taken at the end of each frame: whether every speed is finite, the node that moves fastest, and the greatest
+    penetration of the surface into the probe, m. A run that blows up is full of NaN by the next look, so where it began
+    is read off from the last frame that was still finite."""
 
     finite: Array
     node: Int[Array, ""]
+    depth: Float[Array, ""]
 
 
 class Outcome(eqx.Module):
@@ -75,6 +77,7 @@ class Outcome(eqx.Module):
             fastest when all was last finite).
         state: the final state, to go on from.
         balance: energies and crack at the end of each frame, with cohesive faces; else None.
+        penetration: greatest penetration of the surface into the probe at the end of each frame, m (-inf: none).
     """
 
     time: Float[Array, " n"]
@@ -89,12 +92,25 @@ class Outcome(eqx.Module):
     failed: Int[Array, ""]
     element: Int[Array, ""]
     state: State
+    penetration: Float[Array, " n"]
     balance: Balance | None = None
 
     @property
     def depth(self) -> Float[Array, ""]:
         """Greatest penetration seen, m."""
-        return jnp.max(self.checks.depth)
+        return jnp.max(self.penetration)
+
+    @property
+    def hourglass(self) -> Float[Array, ""]:
+        """Greatest energy of the hourglass control over the greatest internal energy: above 5 % the mesh is coarse."""
+        return jnp.max(self.checks.hourglass) / jnp.max(jnp.abs(self.checks.internal))
+
+    def pierced(self, scene: Scene) -> Int[Array, ""]:
+        """First frame at whose end the surface was deeper in the probe than `contact.PIERCED` of its radius, or -1."""
+        if scene.probe is None:
+            return jnp.asarray(-1)
+        deep = self.penetration > contact.PIERCED * contact.breadth(scene)
+        return jnp.where(jnp.any(deep), jnp.argmax(deep), -1)
 
     @property
     def inertia(self) -> Float[Array, ""]:
@@ -129,12 +145,11 @@ def proceed(m: Machine, state: State) -> Outcome:
         looked = None
         if scene.faces is not None:
             looked = look(m, state, None if drive.centre is None else drive.centre[-1] + drive.stride[-1])
-        return state, (mean, _markers(scene, state.u), _pace(state), looked)
+        return state, (mean, _markers(scene, state.u), _pace(m, state, drive), looked)
 
     def block(state, drive):
         state, out = jax.lax.scan(frame, state, drive, length=length)
-        last = None if drive.centre is None else drive.centre[-1, -1]
-        return state, (out, _checks(m, state, last))
+        return state, (out, _checks(m, state, jnp.max(out[2].depth)))
 
     if _too_much_to_store(scene):
         block = jax.checkpoint(block, prevent_cse=False)
@@ -208,13 +223,22 @@ def _markers(scene, u):
     return markers.rest + jnp.einsum("kv,ikv->ki", markers.weights, u[:, markers.nodes])
 
 
-def _pace(state: State) -> Pace:
+def _pace(m: Machine, state: State, drive: Drive) -> Pace:
     v = jax.lax.stop_gradient(state.v)
     square = jnp.sum(v * v, 0)
-    return Pace(jnp.isfinite(jnp.sum(square)), jnp.argmax(square))
+    return Pace(jnp.isfinite(jnp.sum(square)), jnp.argmax(square), _depth(jax.lax.stop_gradient((m, state)), drive))
 
 
-def _checks(m: Machine, state: State, centre) -> Checks:
+def _depth(frozen: tuple[Machine, State], drive: Drive) -> Float[Array, ""]:
+    m, state = frozen
+    if drive.centre is None:
+        return jnp.asarray(-jnp.inf, state.u.dtype)
+    centre = jax.lax.stop_gradient(drive.centre[-1])
+    centre = centre if state.felt is None else centre + m.scene.probe.compliance * state.felt
+    return contact.depth(m.scene.probe, m.patch, state.u, centre)
+
+
+def _checks(m: Machine, state: State, deep: Float[Array, ""]) -> Checks:
     u, v = jax.lax.stop_gradient((state.u, state.v))
     frozen = jax.lax.stop_gradient(m)
     energy, J, hourglass = internal.internal_energy(frozen.scene, frozen.mesh, u)
@@ -222,9 +246,6 @@ def _checks(m: Machine, state: State, centre) -> Checks:
     J = jnp.where(jnp.isfinite(J), J, jnp.inf)[: len(frozen.scene.body.cells)]
     worst = jnp.argmin(J)
     failed = (J[worst] <= 0) | ~jnp.isfinite(jnp.sum(v))
-    deep = jnp.asarray(-jnp.inf, u.dtype)
-    if centre is not None:
-        deep = contact.depth(frozen.scene.probe, frozen.patch, u, jax.lax.stop_gradient(centre))
     return Checks(kinetic, energy, hourglass, deep, failed, worst)
 
 
@@ -245,34 +266,34 @@ def _outcome(scene, felt, markers, pace, checks, length, state, ledger) -> Outco
         work=jnp.cumsum(felt.work), markers=markers, checks=checks, check_time=clock.start + clock.interval * ends,
         failed=frame, element=jnp.where(bad, jnp.where(burst, near, checks.element[first]), -1), state=state,
         balance=ledger,
+        penetration=pace.depth[: clock.frames],
     )  # fmt: skip
 
 
 compiled = jax.jit(simulate, compiler_options=COMPILER_OPTIONS)
 
 
-def run(scene: Scene) -> Outcome:
-    """Simulate, jitted and checked.
+def run(scene: Scene, halvings: int = 2) -> Outcome:
+    """Simulate, jitted and checked. A run that breaks down is tried again with half the step.
+
+    Args:
+        scene: the set-up.
+        halvings: how often at most the step is halved; each takes a compilation and twice as long.
 
     Raises:
-        UnstableSimulation: a value was not finite or an element inverted: when, which, and what to do.
+        UnstableSimulation: a value was not finite or an element inverted, also with the shortest step, or the probe
+            went through the surface: when, where, and what to do.
     """
     out = compiled(scene)
-    check(out, scene)
+    for _ in range(halvings):
+        if int(out.failed) < 0 or not verdict.shorter_helps(out, scene):
+            break
+        scene = verdict.halved(scene)
+        out = compiled(scene)
+    verdict.check(out, scene)
     return out
 
 
 def check(out: Outcome, scene: Scene) -> None:
-    """Raise `UnstableSimulation` if the run failed (host side)."""
-    frame = int(out.failed)
-    if frame < 0:
-        return
-    element = int(out.element)
-    place = scene.body.points[scene.body.cells[element]].mean(0) * 1e3
-    when = float(out.end_time[frame])
-    raise UnstableSimulation(
-        f"the simulation broke down by t = {when:.4g} s (frame {frame}): element {element} near "
-        f"({', '.join(f'{x:.1f}' for x in place)}) mm is inverted or no longer finite; the step was "
-        f"{float(scene.clock.step) * 1e3:.3g} ms. Take a smaller step (stiffer parameters need one), less time "
-        "compression, less stiffness damping, or a finer mesh under the probe"
-    )
+    """See `verdict.check`."""
+    verdict.check(out, scene)

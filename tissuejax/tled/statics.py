@@ -16,11 +16,13 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from tissuejax.errors import NotConverged
-from tissuejax.tled import capsule, contact, internal, stable, support
+from tissuejax.tled import capsule, contact, internal, stable, support, verdict
 from tissuejax.tled.scene import Scene
 from tissuejax.tled.simulate import COMPILER_OPTIONS, series
 
 CHECK = 25  # iterations between two looks at the residual
+RAISES = 3  # how often a search that burst is begun again with twice the margin
+FINEST = 1 / 64  # share of the load below which a step that finds no equilibrium is not halved any more
 
 
 class Equilibrium(eqx.Module):
@@ -105,7 +107,30 @@ def unbalanced(at: Load, w: Float[Array, "3 N"]) -> Float[Array, "3 N"]:
 
 
 def relax(at: Load, start: Float[Array, "3 N"], tolerance: float, most: int, margin: float):
-    """Dynamic relaxation from `start`; (w, (relative residual, iterations))."""
+    """Dynamic relaxation from `start`; (w, (relative residual, iterations)).
+
+    A search that bursts, or comes to rest with an element inside out, is begun again with twice the margin.
+    """
+    count = len(at.scene.body.cells)
+
+    def bad(w, residual):
+        J = internal.internal_energy(at.scene, at.mesh, jnp.where(at.held, at.target, w))[1][:count]
+        return ~jnp.isfinite(residual) | ~jnp.all(J > 0)
+
+    def again(carry):
+        _, _, done, margin, _ = carry
+        w, (residual, more) = _relax(at, start, tolerance, most, margin)
+        return w, residual, done + more, 2.0 * margin, bad(w, residual)
+
+    def going(carry):
+        return carry[4] & (carry[3] < first * 2.0 ** (RAISES + 0.5))
+
+    zero, first = jnp.asarray(0.0, start.dtype), jnp.asarray(margin, start.dtype)
+    w, residual, done, _, _ = jax.lax.while_loop(going, again, (start, zero, zero, first, jnp.asarray(True)))
+    return w, (residual, done)
+
+
+def _relax(at: Load, start: Float[Array, "3 N"], tolerance: float, most: int, margin):
     mass = 0.25 * margin * at.diagonal
     free = ~at.held
 
@@ -159,7 +184,8 @@ def equilibrium(
         time: real time at which probe and support are looked up, s.
         tolerance: on the greatest unbalanced force over the greatest force.
         most: iterations after which it is given up (the displacement is NaN then; `checked` says so).
-        margin: fictitious mass over its estimate at rest; large strains stiffen and need more (4 at a stretch of 0.6).
+        margin: fictitious mass over its estimate at rest; large strains stiffen and need more (4 at a stretch of 0.6):
+            a search that bursts is begun again with twice as much, `RAISES` times at most.
     """
     scene = scene.cast(scene.body.points.dtype)
     at = load(scene, time)
@@ -184,6 +210,14 @@ def equilibrium(
 compiled = jax.jit(equilibrium, compiler_options=COMPILER_OPTIONS, static_argnames=("most",))
 
 
+def _how(found: Equilibrium) -> str:
+    """Why there is no answer."""
+    residual = float(found.residual)
+    if bool(found.inverted):
+        return "an element came out inverted"
+    return f"unbalanced force {residual:.1e} of the greatest" if 0 <= residual < jnp.inf else "it burst"
+
+
 def checked(found: Equilibrium) -> Equilibrium:
     """`found`, or the sentence that says why not.
 
@@ -191,11 +225,54 @@ def checked(found: Equilibrium) -> Equilibrium:
         NotConverged: the residual did not fall below the tolerance.
     """
     if not bool(jnp.isfinite(found.displacement).all()):
-        residual = float(found.residual)
-        how = f"unbalanced force {residual:.1e} of the greatest" if 0 <= residual < jnp.inf else "it burst"
-        how = "an element came out inverted" if bool(found.inverted) else how
         raise NotConverged(
-            f"no static equilibrium after {int(found.iterations)} iterations: {how}; check loads and support, use "
-            "double precision, allow more iterations, a larger margin, or come nearer in smaller steps"
+            f"no static equilibrium after {int(found.iterations)} iterations: {_how(found)}; check loads and support, "
+            "use double precision, allow more iterations, or come nearer in smaller steps (`statics.gradual`)"
         )
     return found
+
+
+def gradual(scene: Scene, time: float = 0.0, **options) -> Equilibrium:
+    """`equilibrium` at `time`, reached in steps of load that shorten themselves (host side).
+
+    First gravity grows from none (unless `body.settled` is given), then probe and support go their way from the clock's
+    start to `time`; each search begins where the last ended, and a step that finds no equilibrium is halved.
+
+    Args:
+        scene, time: as for `equilibrium`.
+        options: `tolerance`, `most`, `margin` of `equilibrium`.
+
+    Raises:
+        NotConverged: the load that was reached, and what to do.
+    """
+    begin, u = float(scene.clock.start), scene.body.settled
+    if scene.gravity is not None and u is None:
+        g = scene.gravity
+        u = _led(scene, u, lambda s: ({"gravity": s * g}, begin), "gravity", options).displacement
+    return _led(scene, u, lambda s: ({}, begin + s * (time - begin)), "the way", options, time)
+
+
+def _led(scene, u, at, what: str, options, time=None) -> Equilibrium:
+    """Follow a load from its share 0 to 1."""
+    u = jnp.zeros_like(scene.body.points) if u is None else u
+    reached, step = 0.0, 1.0
+    while True:
+        share = min(1.0, reached + step)
+        changes, when = at(share)
+        found = compiled(scene.put({**changes, "body.settled": u}), when, **options)
+        if bool(jnp.isfinite(found.displacement).all()):
+            if share == 1.0:
+                return found
+            u, reached, step = found.displacement, share, 2 * step
+            continue
+        step /= 2
+        if step < FINEST:
+            where = f"{reached:.0%} of {what}"
+            where = where if time is None else f"{where} (t = {at(reached)[1]:.4g} of {time:.4g} s)"
+            said = f"no static equilibrium beyond {where}: {_how(found)}. "
+            if time is None:
+                raise NotConverged(said + verdict.weight(scene))
+            raise NotConverged(
+                said + "The tissue may have no equilibrium there (a law that softens, a probe that is too deep): press "
+                "less deep, take a finer mesh under the probe, or run it explicitly"
+            )

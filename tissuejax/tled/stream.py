@@ -63,7 +63,7 @@ def run_to_file(
             state = _load(file, state, path)
         else:
             file["points"], file["cells"] = np.asarray(scene.body.points), np.asarray(scene.body.cells)
-            file.attrs["cell_type"] = scene.body.element.name
+            file.attrs["cell_type"] = scene.body.element.cells
         stop = total if chunks is None else min(total, done + chunks)
         with progress.stage("simulating", total=stop - done) as stage:
             for k in range(done, stop):

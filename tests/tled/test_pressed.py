@@ -1,0 +1,139 @@
+"""Contact is not passed through unsaid; step and penalty follow the pressed tissue; failures have their name."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from tests.tled import cases
+from tissuejax.energies.published import published
+from tissuejax.energies.reduced_polynomial import ReducedPolynomial
+from tissuejax.energies.volumetric import Quadratic
+from tissuejax.errors import NotConverged, UnstableSimulation
+from tissuejax.mesh.columns import box
+from tissuejax.recordings.recording import Geometry
+from tissuejax.tled import build, gravity, pressed, statics
+from tissuejax.tled.shapes import Hemisphere
+from tissuejax.tled.simulate import run
+
+CUBE = box((0.02, 0.02, 0.02), (2, 2, 2))
+
+
+def tissue(energy, values, K=20e3, geometry=CUBE, **options):
+    times = options.pop("times", np.arange(2.0) * 1e-3)
+    return build.scene(geometry, energy, Quadratic(), values, dict(K=K), 1000.0, times, **options)
+
+
+def test_stiffening_is_that_of_the_closed_form():
+    """Ogden in ABAQUS's form: d sigma / d ln l = sum 2 mu_i (l^a_i + l^(-a_i/2) / 2), 3 sum mu_i at rest."""
+    material = published("ex-vivo-ogden")
+    mu, alpha = (np.array([material.constants[f"{k}{i}"] for i in (1, 2, 3, 4)]) for k in ("mu", "alpha"))
+    scene = tissue(material.energy, material.constants)
+    for stretch in (0.8, 0.65):
+        slope = np.sum(2 * mu * (stretch**alpha + 0.5 * stretch ** (-alpha / 2)))
+        assert pressed.stiffening(scene, stretch) == pytest.approx(slope / (3 * mu.sum()), rel=0.02)
+    neo = tissue(ReducedPolynomial(order=1), cases.NEO)
+    assert pressed.stiffening(neo, 0.5) == 1.0  # 2 l^2 + 1/l < 3
+
+
+def test_waves_cross_a_squeezed_element_sooner():
+    """K alone at constant volume: d2U/dF33^2 = K / l^2, so the step falls with l (the shear modulus is a hundredth)."""
+    scene = tissue(ReducedPolynomial(order=1), dict(C10=50.0), K=20e3)
+    assert pressed.quickening(scene, 0.5) == pytest.approx(2.0, rel=0.03)
+
+
+def block(depth: float, radius=0.004, counts=(8, 8, 5), energy=None, values=None, **options):
+    """A block of 24 x 24 x 10 mm, the ball pressed in by `depth` at 20 mm/s in ten times."""
+    g = box((0.024, 0.024, 0.010), counts)
+    end = depth / 0.002
+    path = np.array([[0.0, 0.0, 0.010 + radius], [0.0, 0.0, 0.010 + radius - depth]])
+    energy = ReducedPolynomial(order=1) if energy is None else energy
+    return tissue(
+        energy, cases.NEO if values is None else values, 15e3, g, times=(np.arange(25) + 0.5) * end / 25,
+        probe_time=np.array([0.0, end]), probe_position=path, radius=radius, compression=10.0, **options,
+    )  # fmt: skip
+
+
+def test_the_default_step_holds_where_a_third_of_the_thickness_is_pressed_in():
+    scene = block(3.3e-3)
+    at_rest = build.SAFETY * float(build.critical_steps(scene).min())
+    assert float(scene.clock.step) < 0.8 * at_rest
+    run(scene, halvings=0)
+
+
+def test_a_run_that_breaks_down_is_tried_again_with_half_the_step():
+    scene = block(3.3e-3)
+    long = scene.put({"clock.steps": scene.clock.steps // 4})
+    with pytest.raises(UnstableSimulation, match="Take a smaller step"):
+        run(long, halvings=0)
+    out = run(long, halvings=3)
+    assert int(out.failed) == -1
+    assert float(out.force[-1, 2]) == pytest.approx(float(run(scene).force[-1, 2]), rel=0.01)
+
+
+def test_a_ball_that_sinks_through_the_surface_is_refused_with_time_place_and_remedy():
+    scene = block(2e-3)
+    assert float(run(scene).depth) < 0.02 * 0.004
+    soft = scene.put({"probe.penalty": 0.02 * scene.probe.penalty})
+    with pytest.raises(
+        UnstableSimulation, match=r"mm inside the probe at t = .* \(0.0, 0.0, .*\) mm: more than 5%"
+    ) as told:
+        run(soft)
+    needed = float(str(told.value).split("larger penalty (")[1].split()[0])
+    assert run(scene.put({"probe.penalty": needed})).depth < 0.03 * 0.004
+
+
+@pytest.mark.slow
+def test_the_penalty_holds_where_the_law_stiffens_a_hundredfold():
+    """Ex vivo law, a hemisphere pressed to 45 % of the thickness."""
+    material = published("ex-vivo-ogden")
+    scene = block(4.5e-3, shape=Hemisphere(0.004), energy=material.energy, values=material.constants)
+    out = run(scene)
+    assert float(out.depth) < 0.03 * 0.004
+    assert (np.diff(np.asarray(out.force)[4::5, 2]) > 0).all()  # the force never falls while the ball goes down
+
+
+@pytest.mark.slow
+def test_a_breakdown_away_from_the_probe_is_put_down_to_gravity_or_the_support():
+    """A tower of soft tissue under a hundredfold weight, pressed by nothing yet."""
+    g = box((0.01, 0.01, 0.04), (2, 2, 8))
+    path = np.array([[0.0, 0.0, 0.047], [0.0, 0.0, 0.046]])
+    scene = tissue(
+        ReducedPolynomial(order=1), cases.NEO, 15e3, g, times=(np.arange(20) + 0.5) * 0.01, gravity=(0, 0, -981.0),
+        probe_time=np.array([0.0, 0.2]), probe_position=path, radius=0.005,
+    )  # fmt: skip
+    with pytest.raises(UnstableSimulation, match="gravity or the support breaks it. The weight of the tissue's height"):
+        run(scene)
+
+
+def test_statics_raise_their_margin_by_themselves():
+    """One hex drawn to twice its length, which bursts with the margin that small strains need."""
+    one = box((0.01, 0.01, 0.01), (1, 1, 1))
+    ends = np.arange(8)
+    top = one.points[:, 2] > 0.005
+    pattern = np.zeros((8, 3))
+    pattern[top, 2] = 1.0
+    held = np.zeros((8, 3))
+    held[:, 2] = 1.0
+    held[np.linalg.norm(one.points[:, :2] + 0.005, axis=1) < 1e-9, :2] = 1.0
+    held[np.linalg.norm(one.points[:, :2] + [-0.005, 0.005], axis=1) < 1e-9, 1] = 1.0
+    scene = tissue(
+        ReducedPolynomial(order=1), cases.NEO, 1e6, Geometry(one.points, one.cells, one.cell_type, ends), held=held
+    ).put(
+        {
+            "support.time": jnp.arange(2.0), "support.pattern": jnp.asarray(pattern),
+            "support.displacement": jnp.asarray([[0.0, 0.0, 0.01]] * 2),
+        }
+    )  # fmt: skip
+    found = statics.checked(statics.compiled(scene))
+    stretched = one.points + np.asarray(found.displacement)
+    assert np.ptp(stretched[:, 0]) == pytest.approx(0.01 / np.sqrt(2), rel=2e-3)  # K/mu 833: all but incompressible
+
+
+def test_statics_that_have_no_answer_say_how_far_they_came():
+    g = box((0.02, 0.02, 0.02), (2, 2, 2))
+    soft = tissue(ReducedPolynomial(order=1), dict(C10=50.0), 1e3, g, gravity=(0, 0, -981.0))
+    with pytest.raises(NotConverged, match=r"no static equilibrium beyond \d+% of gravity: .* nodes are held"):
+        statics.gradual(soft, most=300)
+    found = gravity.compiled(soft, rounds=2)
+    with pytest.raises(NotConverged, match="no stress-free shape"):
+        gravity.checked(found, soft)

@@ -1,0 +1,96 @@
+"""What went wrong in a run, in a sentence: broken down under the probe, away from it, or gone through the surface."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tissuejax.errors import UnstableSimulation
+from tissuejax.tled import contact
+from tissuejax.tled.scene import Scene
+
+if TYPE_CHECKING:
+    from tissuejax.tled.simulate import Outcome
+
+NEAR = 1.0  # radii around the probe's patch within which a breakdown is put down to the probe
+
+
+def halved(scene: Scene) -> Scene:
+    """The same scene with half the step; the static mass of contact goes with its square."""
+    changes = {"clock.steps": 2 * scene.clock.steps}
+    if scene.probe is not None:
+        changes["probe.mass"] = scene.probe.mass / 4
+    return scene.put(changes)
+
+
+def shorter_helps(out: "Outcome", scene: Scene) -> bool:
+    """Whether a shorter step may cure the breakdown: not where gravity crushes a support."""
+    return _under_probe(int(out.element), scene) or scene.gravity is None
+
+
+def check(out: "Outcome", scene: Scene) -> None:
+    """Raise `UnstableSimulation` if the run failed or the probe went through the surface (host side)."""
+    if int(out.failed) >= 0:
+        raise UnstableSimulation(_broken(out, scene))
+    frame = int(out.pierced(scene))
+    if frame >= 0:
+        raise UnstableSimulation(_pierced(out, scene, frame))
+
+
+def _place(point) -> str:
+    return f"({', '.join(f'{x:.1f}' for x in 1e3 * np.asarray(point))}) mm"
+
+
+def _broken(out, scene) -> str:
+    frame, element = int(out.failed), int(out.element)
+    place = _place(np.asarray(scene.body.points)[np.asarray(scene.body.cells)[element]].mean(0))
+    told = (
+        f"the simulation broke down by t = {float(out.end_time[frame]):.4g} s (frame {frame}): element {element} near "
+        f"{place} is inverted or no longer finite; the step was {float(scene.clock.step) * 1e3:.3g} ms. "
+    )
+    if _under_probe(element, scene):
+        return told + (
+            "Take a smaller step (stiffer parameters need one), less time compression, less stiffness damping, or a "
+            "finer mesh under the probe"
+        )
+    if scene.gravity is None:
+        return told + (
+            "The element is not under a probe: take a smaller step (stiffer parameters need one), less time "
+            "compression or less stiffness damping, and look at the support's motion"
+        )
+    return told + "The element is not under a probe: gravity or the support breaks it. " + weight(scene)
+
+
+def weight(scene: Scene) -> str:
+    """What gravity asks of the tissue, and what to do about it."""
+    points, fixed = np.asarray(scene.body.points), np.asarray(scene.body.fixed)
+    g = float(np.linalg.norm(np.asarray(scene.gravity)))
+    shear = float(scene.tissue.energy.initial_shear_modulus(scene.tissue.energy_values))
+    load = float(scene.tissue.density) * g * float(np.ptp(points[:, 2]))
+    return (
+        f"The weight of the tissue's height ({load:.0f} Pa) is {load / shear:.2g} times its shear modulus ({shear:.4g} "
+        f"Pa) and {len(fixed)} of {len(points)} nodes are held; check density, moduli and gravity, lay the body on a "
+        "larger support, or find its stress-free shape first (`gravity.stress_free`)"
+    )
+
+
+def _pierced(out, scene, frame) -> str:
+    when, deep, reach = float(out.end_time[frame]), float(out.penetration[frame]), float(contact.breadth(scene))
+    path = np.asarray(scene.probe.position)
+    centre = [np.interp(when, np.asarray(scene.probe.time), x) for x in path.T]
+    worst, penalty = float(np.max(out.penetration)), float(scene.probe.penalty)
+    needed = penalty * worst / (0.01 * reach)
+    return (
+        f"the surface is {1e3 * deep:.3g} mm inside the probe at t = {when:.4g} s (frame {frame}), the probe at "
+        f"{_place(centre)}: more than {contact.PIERCED:.0%} of its radius {1e3 * reach:.3g} mm, so the force is "
+        f"too low. Give a larger penalty ({needed:.2g} Pa/m would hold it to 1 to 3 %; it was {penalty:.2g}), a "
+        "finer mesh under the probe, or press less deep"
+    )
+
+
+def _under_probe(element: int, scene: Scene) -> bool:
+    if scene.probe is None:
+        return False
+    points = np.asarray(scene.body.points)
+    here = points[np.asarray(scene.body.cells)[element]].mean(0)
+    facets = points[np.asarray(scene.probe.patch)].mean(1)
+    return bool(np.linalg.norm(facets - here, axis=1).min() <= NEAR * float(contact.breadth(scene)))
