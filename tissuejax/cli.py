@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 from tissuejax import commands as package
 from tissuejax.commands.command import Command
+from tissuejax.commands.problem_file import expanded
 from tissuejax.commands.sentences import Parser, sentence
 from tissuejax.errors import InputError, TissueError
 from tissuejax.families import members
@@ -120,6 +121,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     known = {entry.name: entry for entry in listed()}
     name = next((word for word in argv if not word.startswith("-")), "")
     try:
+        argv = expanded(argv)
         given = parser(name).parse_args(argv)
 
         import jax  # after the parser, so that help and a mistyped option answer at once
