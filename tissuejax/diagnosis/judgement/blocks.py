@@ -1,0 +1,94 @@
+"""Means over blocks of samples: all that was measured, in a hundred numbers a recording.
+
+Neighbouring samples of a slow test say the same but for their noise, so means of blocks lose next to nothing, and a
+covariance matrix of all of them stays small. Blocks are short where the specimen moves or its stress changes and long
+where nothing happens; they depend on the recordings alone, so that all models are compared on the same numbers.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from tissuejax.diagnosis.bench import Bench, Segment
+from tissuejax.estimation.discrepancy import Series, loading_states
+
+SMOOTH = 60  # knots of the stress whose path counts: noise has a path too, and none that tells of anything
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Blocks of every segment of a bench.
+
+    Attributes:
+        starts: first row of each block in the long vector, in order.
+        counts: samples in each.
+        owner: index of the segment of each block.
+    """
+
+    starts: np.ndarray
+    counts: np.ndarray
+    owner: np.ndarray
+
+    def mean(self, x: Float[np.ndarray, "N ..."]) -> Float[np.ndarray, "M ..."]:
+        """Means over the blocks."""
+        return np.add.reduceat(x, self.starts, axis=0) / self.counts.reshape(-1, *([1] * (x.ndim - 1)))
+
+    def spread(self, sigma: Float[np.ndarray, " N"]) -> Float[np.ndarray, " M"]:
+        """Standard deviation of the means, where samples have independent errors of `sigma`."""
+        return np.sqrt(np.add.reduceat(sigma**2, self.starts)) / self.counts
+
+
+def path(x: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Length of the way so far, 0 to 1; even steps where there is none."""
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(x)))])
+    return way / way[-1] if way[-1] > 0 else np.linspace(0, 1, len(x))
+
+
+def smoothed(y: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """y between means of at most SMOOTH pieces."""
+    edges = np.unique(np.linspace(0, len(y), min(SMOOTH, len(y)) + 1).astype(int))
+    means = np.add.reduceat(y, edges[:-1]) / np.diff(edges)
+    return np.interp(np.arange(len(y)), 0.5 * (edges[:-1] + edges[1:] - 1), means)
+
+
+def blocks(bench: Bench, total: int = 480, least: int = 30, most: int = 100) -> Blocks:
+    """Blocks of all segments: about `total` in all, `least` to `most` a segment."""
+    several = int(np.clip(total // max(len(bench.segments), 1), least, most))
+    starts, owner = [], []
+    for k, s in enumerate(bench.segments):
+        n = len(s.time)
+        wanted = min(several, n)
+        way = (np.linspace(0, 1, n) + path(s.drive) + path(smoothed(bench.y[s.rows]))) / 3
+        which = np.minimum((way * wanted).astype(int), wanted - 1) if wanted < n else np.arange(n)
+        first = np.flatnonzero(np.diff(which, prepend=-1))
+        starts.append(s.rows.start + first)
+        owner += [k] * len(first)
+    flat = np.concatenate(starts)
+    return Blocks(flat, np.diff(np.append(flat, len(bench.y))), np.array(owner))
+
+
+def series(bench: Bench, cut: Blocks, modes: Mapping[str, object]) -> list[Series]:
+    """The blocks as the discrepancy sees them; `modes` says by recording what kind of test it is."""
+    out = []
+    for k, s in enumerate(bench.segments):
+        own = Blocks(cut.starts[cut.owner == k] - s.rows.start, cut.counts[cut.owner == k], np.zeros(0, int))
+        driven = np.stack([strain(o) for o in bench.segments if o.recording == s.recording], axis=1)
+        peaks = [np.quantile(np.abs(bench.y[o.rows]), 0.98) for o in bench.segments if o.recording == s.recording]
+        out.append(
+            Series(
+                s.recording,
+                (modes[s.recording], s.component),
+                own.mean(s.time),
+                own.mean(driven),
+                own.mean(loading_states(strain(s))),
+                float(max(peaks)) or 1.0,
+            )
+        )
+    return out
+
+
+def strain(s: Segment) -> Float[np.ndarray, " n"]:
+    """ln stretch, or the amount of shear."""
+    return np.log(s.drive) if s.drive_name == "stretch" else s.drive

@@ -1,0 +1,44 @@
+"""All numbers of the judgement in one record, each with unit, meaning and ground."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """What is held for probable before a recording is seen, and where an answer changes its name.
+
+    Attributes:
+        sizes: probability that 0, 1, 2, 3 effects of the catalogue act that the base model lacks. Ground: as often
+            something as nothing, and rarely much at once; spread evenly over the names, and over the forms of a name.
+        unknown: probability that something acts that neither the catalogue nor an ordinary discrepancy has. Ground: as
+            likely as two effects at once; taken off the others in proportion.
+        shares: standard deviation of the half-normal prior of a discrepancy's amplitude, a share of the stress, by
+            family. Ground: what the best published laws leave of careful recordings, 1 to 4 % of the peak in all.
+        strange: the same where something unknown acts, by which factor more. Ground: 10 makes of 1 to 2 % the 10 to 20 %
+            by which effects of the catalogue change a recording.
+        change: standard deviation of the half-normal (two-sided: normal) prior of an effect's amplitude: the change of
+            the stress that it makes alone, as a share of the stress (root mean squares). Ground: effects worth a name
+            are some per cent to a half of what is measured.
+        shape: standard deviation of the logarithm of a positive shape (time, energy, exponent) about the middle of
+            the values scanned. Ground: a factor of 5 either way.
+        negligible: root mean square of the rest, as a share of the peak, up to which nothing of note is left.
+            Ground: load cells are verified to 1 % (class 1 of ISO 7500-1); half of that.
+        named: probability from which a name is given. Ground: likelier present than not (the median probability model
+            of Barbieri and Berger 2004).
+        covered: share of the probability of named sets that the alternatives offered add up to.
+    """
+
+    sizes: tuple[float, ...] = (0.4, 0.4, 0.15, 0.05)
+    unknown: float = 0.1
+    shares: Mapping[str, float] = field(
+        default_factory=lambda: {"law": 0.015, "gain": 0.015, "hysteresis": 0.01, "slow": 0.01, "white": 0.005}
+    )
+    strange: float = 10.0
+    change: float = 0.3
+    shape: float = float(np.log(5.0))
+    negligible: float = 0.005
+    named: float = 0.5
+    covered: float = 0.9

@@ -1,0 +1,104 @@
+"""What a finished search says, as plain numbers: all that a verdict rests on, and no bench behind it.
+
+Written beside the result as `evidence.json`, so that a verdict can be asked for again with other criteria.
+"""
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from tissuejax.errors import InputError
+from tissuejax.storage import write_json
+
+
+@dataclass(frozen=True)
+class SetEvidence:
+    """One set of effects, weighed.
+
+    Attributes:
+        keys: candidates (effect/form) in the set, in the order in which they were added.
+        names: their effects, each once.
+        label: "" or the hypothesis without a name ("unknown": a discrepancy far larger than usual).
+        log_evidence: log p(measurements | set), nats; the sum of the next three.
+        fit: log density of the measurements at the fit, parameters' and amplitudes' factors left out.
+        parameters: log of prior times posterior width of the free parameters (Occam's factor).
+        discrepancy: the same of the discrepancy's amplitudes.
+        amplitudes: of the discrepancy by part, shares of the stress.
+        k: free parameters.
+        at_bound: those that rest on a bound.
+        void: an effect of the set rests at neutral, so the set is the one without it.
+        chi2, n: misfit over the stated noise without any discrepancy, block means, and how many there are.
+        kurtosis: excess kurtosis of the whitened residuals: jumps that no part of the discrepancy has.
+        explained: share of the base's misfit (beyond noise) that the set's model alone removes.
+        rest: mean square of the discrepancy left, as a share of the squared peak, and its standard deviation.
+        held: root mean square error of the recordings called held out over their noise, parameters fitted on the
+            others alone; None where there are none or it wasn't asked for.
+        numerical: share of the misfit that the simulation's own error may be; 0 for closed forms.
+    """
+
+    keys: tuple[str, ...]
+    names: tuple[str, ...]
+    label: str
+    log_evidence: float
+    fit: float
+    parameters: float
+    discrepancy: float
+    amplitudes: Mapping[str, float]
+    k: int
+    at_bound: tuple[str, ...]
+    void: bool
+    chi2: float
+    n: int
+    kurtosis: float
+    explained: float
+    rest: tuple[float, float]
+    held: float | None = None
+    numerical: float = 0.0
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """All sets that were weighed.
+
+    Attributes:
+        sets: every set weighed once, in its best fit.
+        forms: by name, how many forms of it were offered (each effect's prior is shared among its forms).
+        fitted, held_out: recordings; all of them are measurements for the evidence.
+        exhausted: whether sets were left untried because the budget was spent.
+    """
+
+    sets: tuple[SetEvidence, ...]
+    forms: Mapping[str, int]
+    fitted: tuple[str, ...]
+    held_out: tuple[str, ...]
+    exhausted: bool = False
+
+    def as_dict(self) -> dict:
+        """For `evidence.json`."""
+        return dataclasses.asdict(self)
+
+
+def read_evidence(path: Path) -> Evidence:
+    """Evidence that was written before.
+
+    Raises:
+        InputError: no such file, or not one that a diagnosis has written.
+    """
+    try:
+        given = json.loads(Path(path).read_text())
+        tuples = {"keys", "names", "at_bound", "rest"}
+        sets = [SetEvidence(**{k: tuple(v) if k in tuples else v for k, v in s.items()}) for s in given["sets"]]
+        return Evidence(
+            tuple(sets), given["forms"], tuple(given["fitted"]), tuple(given["held_out"]), given["exhausted"]
+        )
+    except (OSError, KeyError, TypeError, json.JSONDecodeError) as error:
+        raise InputError(
+            f"{path}: no evidence of a diagnosis ({error}); `tissuejax diagnose FILE --out FOLDER` writes one"
+        ) from error
+
+
+def write_evidence(evidence: Evidence, path: Path) -> Path:
+    """Write it, whole or not at all."""
+    return write_json(path, evidence.as_dict())

@@ -1,0 +1,318 @@
+"""Which sets of effects are weighed: nominated by the evidence of one linear step, grown, reshaped, and pruned.
+
+At the fit of a set every candidate's linear step is scored under the noise and the discrepancy of that fit, and again
+under a discrepancy of its prior's size (a set that has no name yet may have given its misfit to the discrepancy). The
+best are weighed in full (`weigh`). Sets of two grow from the best single ones, sets of three from the best pairs, the
+best sets are tried in all their forms and with every effect left out.
+"""
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tissuejax.diagnosis.bench import Bench
+from tissuejax.diagnosis.judgement.blocks import Blocks, blocks, series
+from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.evidence import Evidence
+from tissuejax.diagnosis.judgement.judge import log_prior
+from tissuejax.diagnosis.judgement.marginal import Blocked
+from tissuejax.diagnosis.judgement.weigh import Scales, Weighed, weigh
+from tissuejax.diagnosis.judgement.whitening import Whitening
+from tissuejax.diagnosis.score import Score, complement, gain, trusted
+from tissuejax.diagnosis.starts import distinct, inside
+from tissuejax.errors import NotConverged
+from tissuejax.estimation.discrepancy import Series, discrepancy
+
+UNKNOWN = "unknown"
+HOPEFUL = 12.0  # nats below the best set up to which other forms and further effects of a set are tried
+GIVEN_UP = 30.0  # nats below the best set: a set is not followed to the end of its fit
+LITTLE = -4.0  # nats: a nominee whose linear step promises less is not weighed
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is tried.
+
+    Attributes:
+        most: effects in a set at most.
+        singles, pairs, triples: sets weighed when sets of that size are grown.
+        parents: sets of one and of two that are grown further.
+        reshaped: sets that are tried in all their forms, by size.
+        starts: settings of the shapes that a set is begun from.
+        spend: cost of all predictions (of the plain base model each) after which nothing new is begun.
+        burden: searches and memories nested in a prediction at most.
+    """
+
+    most: int = 3
+    singles: int = 10
+    pairs: int = 12
+    triples: int = 8
+    parents: tuple[int, int] = (3, 3)
+    reshaped: tuple[int, ...] = (3, 2, 1)
+    starts: int = 2
+    spend: float = 6e4
+    burden: int = 2
+
+
+@dataclass
+class Exploration:
+    """All that was weighed.
+
+    Attributes:
+        bench: all recordings fitted.
+        weighed: by set of keys; the unknown under {UNKNOWN}.
+        scored: linear scores at each set that was extended.
+    """
+
+    bench: Bench
+    criteria: Criteria
+    effort: Effort
+    scales: Scales
+    report: Callable[[str], None] = lambda _: None
+    weighed: dict[frozenset, Weighed] = field(default_factory=dict)
+    scored: dict[frozenset, list[Score]] = field(default_factory=dict)
+    exhausted: bool = False
+
+    @property
+    def forms(self) -> dict[str, int]:
+        """How many forms of every effect are offered."""
+        names = [c.name for c in self.bench.candidates.values()]
+        return {n: names.count(n) for n in dict.fromkeys(names)}
+
+    def worth(self, key: frozenset) -> float:
+        """Log posterior of a weighed set, up to a constant."""
+        e = self.weighed[key].evidence
+        if e.void or not math.isfinite(e.log_evidence):
+            return -math.inf
+        return e.log_evidence + log_prior(e, self.forms, self.criteria)
+
+    def names(self, key: frozenset) -> frozenset:
+        """Effects in a set, whatever their form."""
+        return frozenset(self.bench.candidates[k].name for k in key)
+
+    def ranked(self, size: int) -> list[frozenset]:
+        """The best form of every set of `size` effects, best first."""
+        found: dict[frozenset, frozenset] = {}
+        for key in sorted((k for k in self.weighed if k != frozenset({UNKNOWN}) and len(k) == size), key=self.worth)[
+            ::-1
+        ]:
+            if self.worth(key) > -math.inf:
+                found.setdefault(self.names(key), key)
+        return list(found.values())
+
+    def near(self, size: int) -> list[frozenset]:
+        """Those of `ranked` that other forms may bring to the top."""
+        top = self.worth(self.best)
+        return [k for k in self.ranked(size) if self.worth(k) > top - HOPEFUL]
+
+    @property
+    def best(self) -> frozenset:
+        """The most probable of all sets of known effects."""
+        return max((k for k in self.weighed if k != frozenset({UNKNOWN})), key=self.worth)
+
+    def evidence(self, fitted: tuple[str, ...], held_out: tuple[str, ...]) -> Evidence:
+        """All of it as plain numbers."""
+        sets = tuple(w.evidence for w in self.weighed.values())
+        return Evidence(sets, self.forms, fitted, held_out, self.exhausted)
+
+    def weigh(self, order: Sequence[str], starts: Sequence[Mapping[str, float]], **options) -> Weighed | None:
+        """Weigh a set from the best of several starts; remembered. None if there is nothing left to spend."""
+        key = frozenset(order)
+        if key in self.weighed and not options:
+            return self.weighed[key]
+        if len(order) > 1 and self.bench.spent > self.effort.spend:
+            self.exhausted = True
+            return None
+        self.report(" + ".join(order) or "base model")
+        if len(starts) > 1:
+            tried = [weigh(self.scales, order, s, self.criteria, rounds=1, iterations=5, **options) for s in starts]
+            first = max(tried, key=lambda w: w.evidence.log_evidence)
+            starts = [first.refit.values or starts[0]]
+            options = {"v": first.v, **options} if first.refit.values else options
+        floor = self.weighed[self.best].evidence.log_evidence - GIVEN_UP
+        found = weigh(self.scales, order, starts[0], self.criteria, floor=floor, **options)
+        old = self.weighed.get(key)
+        if old is None or found.evidence.log_evidence > old.evidence.log_evidence:
+            self.weighed[key] = found
+        return self.weighed[key]
+
+    def score(self, key: frozenset) -> list[Score]:
+        """Every candidate that may join the set, by the log evidence that its linear step gains, best first."""
+        if key in self.scored:
+            return self.scored[key]
+        at, names = self.weighed[key], self.names(key)
+        left = [
+            c
+            for c in self.bench.candidates.values()
+            if c.name not in names and c.nominated and self.bench.burden((*key, c.key)) <= self.effort.burden
+        ]
+        values, bench, scales = at.refit.values, self.bench, self.scales
+        prediction = at.refit.prediction
+        grids = [list(bench.settings(c, prediction)) for c in left]
+        wanted = [(s, a) for c, grid in zip(left, grids, strict=True) for s in grid for a in c.amplitudes]
+        if not wanted:
+            return []
+        columns = bench.columns(values, wanted)
+        jac = bench.jacobian(values, tuple(values), bench.fitted)
+        usual = scales.priors(self.criteria, {}) ** 2
+        found: dict[str, Score] = {}
+        for v in (at.v, usual):
+            whitening = Whitening(bench, scales.cut, scales.blocked, at.parts, v)
+            basis = complement(whitening.whiten(jac, bench.fitted))
+            r = whitening.residual(prediction, bench.fitted)
+            r = r - basis @ (basis.T @ r)
+            white = whitening.whiten(columns, bench.fitted)
+            white = white - basis @ (basis.T @ white)
+            column = 0
+            for c, grid in zip(left, grids, strict=True):
+                trials, k = [], len(c.amplitudes)
+                for s in grid:
+                    block, raw = white[:, column : column + k], columns[:, column : column + k]
+                    column += k
+                    if np.all(np.isfinite(block)):
+                        trials.append(self._trial(c, s, values, r, block, raw))
+                trials = sorted(trials, key=lambda t: -t[0])
+                if trials and (c.key not in found or trials[0][0] > found[c.key].gain):
+                    g, step, setting, moved = trials[0]
+                    size = float(np.linalg.norm(moved)) or 1.0
+                    all_of_them = tuple(t[:3] for t in trials)
+                    share = float(min(max(2 * g / max(r @ r, 1e-9), 0.0), 1.0))
+                    found[c.key] = Score(c.key, g, share, step, setting, moved / size, all_of_them)
+        self.scored[key] = sorted(found.values(), key=lambda s: -s.gain)
+        return self.scored[key]
+
+    def _trial(self, c, setting, values, r, block, raw) -> tuple[float, dict, dict, np.ndarray]:
+        """Log evidence of the linear step: what it removes, less what its amplitudes could have done."""
+        bench = self.bench
+        origin = np.array([{**bench.start, **values, **setting}[a] for a in c.amplitudes])
+        low = np.array([trusted(bench.free[a])[0] for a in c.amplitudes]) - origin
+        high = np.array([trusted(bench.free[a])[1] for a in c.amplitudes]) - origin
+        g, step = gain(r, block, np.minimum(low, 0.0), np.maximum(high, 0.0))
+        moved = np.sum(self.scales.cut.mean(raw) ** 2, axis=0)
+        stress = float(np.sum(self.scales.reference**2))
+        size = self.criteria.change * np.sqrt(stress / np.maximum(moved, 1e-300))
+        h = (block * size).T @ (block * size)
+        price = 0.5 * float(np.linalg.slogdet(np.eye(len(h)) + h)[1])
+        worth = 0.5 * g - price - math.log(self.forms[c.name])
+        return worth, dict(zip(c.amplitudes, step.tolist(), strict=True)), dict(setting), block @ step
+
+    def extend(self, parents: Sequence[frozenset], most: int, each: int) -> None:
+        """Weigh sets with one effect more: the best nominees of every parent in turn."""
+        lists = []
+        for key in parents:
+            seen: dict[str, list[Score]] = {}
+            for s in self.score(key):
+                if s.gain < LITTLE:
+                    break
+                seen.setdefault(self.bench.candidates[s.key].name, []).append(s)
+            lists.append([(key, rows[0]) for rows in itertools.islice(seen.values(), each)])
+        tried = {self.names(k) for k in self.weighed if k != frozenset({UNKNOWN})}
+        for row in itertools.zip_longest(*lists):
+            for key, score in filter(None, row):
+                company = self.names(key | {score.key})
+                if most <= 0 or company in tried:
+                    continue
+                tried.add(company)
+                if self._grown(key, score) is not None:
+                    most -= 1
+
+    def _grown(self, key: frozenset, score: Score) -> Weighed | None:
+        parent, candidate = self.weighed[key], self.bench.candidates[score.key]
+        starts = [
+            {**parent.refit.values, **setting, **inside(self.bench, candidate, step, setting, parent.refit.values)}
+            for _, step, setting in distinct(score, self.effort.starts, whole=not key)
+        ]
+        return self.weigh((*parent.evidence.keys, score.key), starts)
+
+    def reshape(self, key: frozenset) -> None:
+        """Weigh a set in the other forms of its effects, from form to neighbouring form as long as that gains."""
+        at = None
+        while at != (at := max((k for k in self.weighed if self.same(k, key)), key=self.worth)):
+            parent = self.weighed[at]
+            for old in parent.evidence.keys:
+                for new in self.bench.candidates[old].beside:
+                    order = tuple(new if k == old else k for k in parent.evidence.keys)
+                    if frozenset(order) in self.weighed or self.bench.burden(order) > self.effort.burden:
+                        continue
+                    starts = [{**parent.refit.values, **s} for s in self.bench.candidates[new].grid]
+                    most = len(starts) if len(order) == 1 else self.effort.starts
+                    self.weigh(order, starts[: max(most, 1)][:4])
+
+    def same(self, a: frozenset, b: frozenset) -> bool:
+        """Whether two sets hold the same effects."""
+        return frozenset({UNKNOWN}) not in (a, b) and self.names(a) == self.names(b) and len(a) == len(b)
+
+    def leave_out(self, key: frozenset) -> None:
+        """Weigh the set without each of its effects, from where it came to rest."""
+        parent = self.weighed[key]
+        for k in parent.evidence.keys if len(key) > 1 else ():
+            order = tuple(x for x in parent.evidence.keys if x != k)
+            self.weigh(order, [parent.refit.values], v=parent.v)
+
+    def unknown(self) -> None:
+        """Weigh the base beside a discrepancy far larger than usual."""
+        base = self.weighed[frozenset()]
+        wide = {family: share * self.criteria.strange for family, share in self.criteria.shares.items()}
+        self.weighed[frozenset({UNKNOWN})] = weigh(
+            self.scales, (), base.refit.values, self.criteria, v=base.v, wide=wide, label=UNKNOWN
+        )
+
+
+def explore(
+    bench: Bench,
+    modes: Mapping[str, object],
+    criteria: Criteria | None = None,
+    effort: Effort | None = None,
+    report: Callable[[str], None] | None = None,
+) -> Exploration:
+    """Weigh the base model and the sets that are worth it; see the module's text.
+
+    Args:
+        bench: with all recordings fitted.
+        modes: by recording, what kind of test it is; recordings of a mode share a law.
+
+    Raises:
+        NotConverged: the base model can't be fitted at all.
+    """
+    criteria, effort = criteria or Criteria(), effort or Effort()
+    cut = blocks(bench)
+    start = {p: bench.start[p] for p in bench.base}
+    scales = scaled(bench, cut, series(bench, cut, modes), bench.y, start)
+    e = Exploration(bench, criteria, effort, scales, report or (lambda _: None))
+    base = weigh(scales, (), start, criteria)
+    if not np.isfinite(base.evidence.log_evidence):
+        raise NotConverged(
+            f"the base model can't be fitted to {', '.join(bench.fitted)}: its prediction is not finite there from any "
+            "parameters tried; name another --energy, or leave out the samples of largest strain"
+        )
+    scales.values, scales.reference = base.refit.values, scales.cut.mean(base.refit.prediction)
+    e.weighed[frozenset()] = base
+    e.extend([frozenset()], effort.singles, effort.singles)
+    for key in e.near(1)[: effort.reshaped[0]]:
+        e.reshape(key)
+    e.unknown()
+    for size, most in ((1, effort.pairs), (2, effort.triples)):
+        parents = e.near(size)[: effort.parents[size - 1]]
+        if size >= effort.most or not parents or (size == 2 and len(e.best) < 2):
+            break
+        e.extend(parents, most, max(most // len(parents), 1) + 2)
+        for key in e.near(size + 1)[: effort.reshaped[size]]:
+            e.reshape(key)
+        e.leave_out(e.best)
+    return e
+
+
+def scaled(
+    bench: Bench, cut: Blocks, seen: Sequence[Series], prediction: np.ndarray, values: Mapping[str, float]
+) -> Scales:
+    """The scales of a sample about the base's fit."""
+    sigma = cut.spread(bench.sigma)
+    edges = np.flatnonzero(np.diff(cut.owner, prepend=-1))
+    rows = tuple(slice(int(a), int(b)) for a, b in zip(edges, [*edges[1:], len(sigma)], strict=True))
+    of = discrepancy(seen, sigma)
+    families = tuple(p.family for p in of.about(sigma))
+    peak = max(s.peak for s in seen)
+    return Scales(bench, of, families, cut, Blocked(rows, sigma), values, cut.mean(prediction), peak)

@@ -1,0 +1,158 @@
+"""From evidence to a verdict, by the rules of probability alone: the same evidence, the same answer, in milliseconds.
+
+The posterior of a set is its prior times its evidence, over the sum of all that were weighed (what was never tried has
+none, and that is said). Effects are named that are likelier present than not. The five answers divide what may be true:
+
+- nothing-missing: no effect of the catalogue, nothing unknown, and a rest that is negligible;
+- unexplained: something unknown, or no effect of the catalogue and a rest that is not negligible;
+- found: exactly the effects named, and a negligible rest;
+- found-in-part: the effects named, and more: a rest of note, or further effects;
+- ambiguous: effects of the catalogue, but not those named.
+
+Their probabilities add up to one and the most probable is given.
+"""
+
+import enum
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+from scipy.stats import norm
+
+from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.evidence import Evidence, SetEvidence
+
+
+class Kind(enum.StrEnum):
+    """The five answers."""
+
+    NOTHING = "nothing-missing"
+    FOUND = "found"
+    IN_PART = "found-in-part"
+    AMBIGUOUS = "ambiguous"
+    UNEXPLAINED = "unexplained"
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The answer and all probabilities behind it.
+
+    Attributes:
+        kind: the most probable answer; probabilities: of all five.
+        names: effects named (likelier present than not); none unless the answer is found or found-in-part.
+        inclusion: by effect, the probability that it is present.
+        missing: probability that something is missing at all.
+        exact: probability that exactly the effects named are present.
+        chosen: the set whose fit is shown: of the answer, or the best attempt.
+        alternatives: named sets beside the chosen one, with their probabilities, most probable first.
+        posterior: by set of names ("" for none, "?" for something unknown), its probability.
+        negligible: probability that what the chosen set leaves is negligible.
+    """
+
+    kind: Kind
+    probabilities: Mapping[Kind, float]
+    names: tuple[str, ...]
+    inclusion: Mapping[str, float]
+    missing: float
+    exact: float
+    chosen: SetEvidence
+    alternatives: tuple[tuple[SetEvidence, float], ...]
+    posterior: Mapping[str, float]
+    negligible: float
+
+    @property
+    def confidence(self) -> float:
+        """Probability of the answer given."""
+        return self.probabilities[self.kind]
+
+
+def log_prior(s: SetEvidence, forms: Mapping[str, int], criteria: Criteria) -> float:
+    """Log prior probability of a set in these forms."""
+    known = math.log1p(-criteria.unknown)
+    if s.label:
+        return math.log(criteria.unknown)
+    size = len(s.names)
+    share = criteria.sizes[size] / math.comb(len(forms), size) if size < len(criteria.sizes) else 0.0
+    return known + (math.log(share) if share else -math.inf) - sum(math.log(forms[n]) for n in s.names)
+
+
+def negligible(s: SetEvidence, criteria: Criteria) -> float:
+    """Probability that the rest's root mean square is below `Criteria.negligible` of the peak."""
+    mean, std = s.rest
+    return float(norm.cdf((criteria.negligible**2 - mean) / max(std, 1e-300)))
+
+
+def judge(evidence: Evidence, criteria: Criteria | None = None) -> Judgement:
+    """The verdict that the evidence asks for; see the module's text."""
+    criteria = criteria or Criteria()
+    usable = [s for s in evidence.sets if not s.void and math.isfinite(s.log_evidence)]
+    groups: dict[frozenset, list[tuple[float, SetEvidence]]] = {}
+    for s in usable:
+        key = frozenset({s.label}) if s.label else frozenset(s.names)
+        groups.setdefault(key, []).append((s.log_evidence + log_prior(s, evidence.forms, criteria), s))
+    weights = {k: float(logsumexp([w for w, _ in rows])) for k, rows in groups.items()}
+    whole = float(logsumexp(list(weights.values())))
+    p = {k: math.exp(w - whole) for k, w in weights.items()}
+    best = {k: max(rows, key=lambda r: r[0])[1] for k, rows in groups.items()}
+    empty = frozenset()
+    unknown = [k for k in p if best[k].label]
+    named = [k for k in p if k != empty and k not in unknown]
+    inclusion = {n: sum(p[k] for k in named if n in k) for n in evidence.forms}
+    stated = frozenset(n for n, x in inclusion.items() if x > criteria.named)
+    with_them = sum(p[k] for k in named if stated and stated <= k)
+    quiet = {k: negligible(best[k], criteria) for k in p}
+    exact = p.get(stated, 0.0) if stated else 0.0
+    chances = {
+        Kind.NOTHING: p.get(empty, 0.0) * quiet.get(empty, 0.0),
+        Kind.FOUND: exact * quiet.get(stated, 0.0) if stated else 0.0,
+        Kind.AMBIGUOUS: sum(p[k] for k in named) - with_them,
+        Kind.UNEXPLAINED: sum(p[k] for k in unknown) + p.get(empty, 0.0) * (1 - quiet.get(empty, 0.0)),
+    }
+    chances[Kind.IN_PART] = max(1.0 - sum(chances.values()), 0.0)
+    kind = max(Kind, key=lambda k: chances[k])
+    chosen = _chosen(kind, stated, named, p, best, empty)
+    ranked = sorted((k for k in named if best[k] is not chosen), key=lambda k: -p[k])
+    return Judgement(
+        kind,
+        chances,
+        tuple(n for n in chosen.names if n in stated) if kind in (Kind.FOUND, Kind.IN_PART) else (),
+        {n: float(x) for n, x in sorted(inclusion.items(), key=lambda kv: -kv[1])},
+        1.0 - chances[Kind.NOTHING],
+        exact,
+        chosen,
+        tuple((best[k], p[k]) for k in ranked[:10]),
+        {best[k].label and "?" or " + ".join(sorted(k)): p[k] for k in sorted(p, key=lambda k: -p[k])},
+        negligible(chosen, criteria),
+    )
+
+
+def _chosen(kind, stated, named, p, best, empty) -> SetEvidence:
+    if kind is Kind.NOTHING or not named:
+        return best[empty]
+    if kind in (Kind.FOUND, Kind.IN_PART):
+        if p.get(stated, 0.0) > 0:
+            return best[stated]
+        return best[max((k for k in named if stated <= k), key=p.get)]
+    return best[max(named, key=p.get)]
+
+
+def covering(judgement: Judgement, criteria: Criteria | None = None) -> tuple[tuple[SetEvidence, float], ...]:
+    """Alternatives that, with the chosen set, cover `Criteria.covered` of the probability of named sets."""
+    criteria = criteria or Criteria()
+    total = sum(p for name, p in judgement.posterior.items() if name not in ("", "?"))
+    at = judgement.posterior.get(" + ".join(sorted(judgement.chosen.names)), 0.0)
+    out = []
+    for s, p in judgement.alternatives:
+        if at >= criteria.covered * total:
+            break
+        out.append((s, p))
+        at += p
+    return tuple(out)
+
+
+def entropy(judgement: Judgement) -> float:
+    """How undecided the posterior over sets is, nats."""
+    p = np.array(list(judgement.posterior.values()))
+    return float(-np.sum(p * np.log(np.maximum(p, 1e-300))))

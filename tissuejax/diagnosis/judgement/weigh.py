@@ -1,0 +1,312 @@
+"""One set of effects weighed: fitted under noise and discrepancy, and its evidence by Laplace's method.
+
+Parameters of the base have flat priors, the same in every set. An effect's amplitude has a normal prior about neutral,
+one-sided where the effect is; its width is in terms of what it does: the amplitude that changes the stress by
+`Criteria.change` of it (derivative at neutral, at the base fit). So one number serves gaps, moduli and rates. Positive
+shapes have normal priors of their logarithms. Fit and amplitudes of the discrepancy are found in turn.
+"""
+
+import copy
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.special import erfcx, log_ndtr
+from scipy.stats import kurtosis
+
+from tissuejax.diagnosis.bench import Bench, Candidate, Free
+from tissuejax.diagnosis.judgement.blocks import Blocks
+from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.evidence import SetEvidence
+from tissuejax.diagnosis.judgement.marginal import (
+    Blocked,
+    Linear,
+    amplitude_mass,
+    amplitudes,
+    smooth,
+)
+from tissuejax.diagnosis.judgement.whitening import Whitening
+from tissuejax.diagnosis.refit import Descent, Refit, refit
+from tissuejax.estimation.discrepancy import Discrepancy, Part
+
+ROUNDS = 4  # of fit and amplitudes in turn
+SETTLED = 0.1  # nats: a round that gains less is the last
+
+
+@dataclass
+class Scales:
+    """What weighing needs of a sample beside the bench; the same for all sets.
+
+    Attributes:
+        bench: with all recordings fitted.
+        discrepancy: its parts, about any prediction.
+        families: of the parts, in order.
+        cut, blocked: block means and their noise.
+        values: the base fit, where the sizes of effects are taken.
+        reference: the stress that it predicts, block means, Pa.
+        peak: the largest stress, Pa.
+    """
+
+    bench: Bench
+    discrepancy: Discrepancy
+    families: tuple[str, ...]
+    cut: Blocks
+    blocked: Blocked
+    values: Mapping[str, float]
+    reference: Float[np.ndarray, " M"]
+    peak: float
+
+    def about(self, prediction: Float[np.ndarray, " N"]) -> tuple[Part, ...]:
+        """The discrepancy's parts beside a prediction (a long vector)."""
+        return self.discrepancy.about(np.nan_to_num(self.cut.mean(prediction)))
+
+    def priors(self, criteria: Criteria, wide: Mapping[str, float]) -> Float[np.ndarray, " K"]:
+        """Prior widths of the amplitudes; `wide` gives families another one."""
+        return np.array([wide.get(f, criteria.shares[f]) for f in self.families])
+
+    def effect_size(self, candidate: Candidate, values: Mapping[str, float], criteria: Criteria) -> dict[str, float]:
+        """For every amplitude of a candidate, the value that changes the stress by `change` of it, to first order."""
+        shapes = {p: values[p] for p in candidate.shapes if p in values}
+        columns = self.cut.mean(self.bench.columns(self.values, [(shapes, a) for a in candidate.amplitudes]))
+        out = {}
+        for a, c in zip(candidate.amplitudes, columns.T, strict=True):  # over what it acts on: its own recording, say
+            moved = float(np.sum(c**2))
+            stress = float(np.sum(self.reference[c != 0] ** 2))
+            out[a] = criteria.change * math.sqrt(stress / moved) if np.isfinite(moved) and moved > 0 else math.inf
+        return out
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A set that was weighed: its evidence, its fit to all recordings, the amplitudes, and what it leaves.
+
+    Attributes:
+        refit: to all recordings, under the discrepancy.
+        v: squared amplitudes of the parts.
+        parts: of the discrepancy, about the fit.
+        rest: the discrepancy's posterior mean over the blocks, Pa.
+    """
+
+    evidence: SetEvidence
+    refit: Refit
+    v: Float[np.ndarray, " K"]
+    parts: tuple[Part, ...]
+    rest: Float[np.ndarray, " M"]
+
+
+def with_priors(
+    scales: Scales, keys: Sequence[str], start: Mapping[str, float], criteria: Criteria
+) -> tuple[Bench, dict[str, tuple[float, float]]]:
+    """The bench with priors on everything that the set frees, and those priors in the coordinates of a descent."""
+    bench, free, priors = scales.bench, dict(scales.bench.free), {}
+    for key in keys:
+        c = bench.candidates[key]
+        sizes = scales.effect_size(c, {**bench.start, **start}, criteria)
+        middle = {p: [g[p] for g in c.grid if p in g] for p in c.shapes}
+        for path in c.amplitudes:
+            if np.isfinite(sizes[path]):
+                priors[path] = (bench.start[path], sizes[path])
+        for path in c.shapes:
+            f, scanned = free[path], middle[path] or [bench.start[path]]
+            if f.log:
+                logs = np.log(scanned)
+                priors[path] = (float(np.mean(logs)), float(np.hypot(criteria.shape, np.std(logs))))
+            else:
+                width = max(5 * f.scale, float(np.ptp(scanned)))
+                priors[path] = (float(np.mean(scanned)), width)
+    for path, prior in priors.items():
+        free[path] = replace(free[path], prior=prior)
+    ready = copy.copy(bench)
+    ready.free = free
+    return ready, priors
+
+
+def log_prior(f: Free, at: float, prior: tuple[float, float]) -> float:
+    """Log density of a normal prior inside the bounds of a parameter, in the coordinates of a descent."""
+    mean, std = prior
+    low, high = (math.log(f.lower), math.log(f.upper)) if f.log else (f.lower, f.upper)
+    a, b = (low - mean) / std, (high - mean) / std
+    if a > 0:
+        a, b = -b, -a
+    inside = log_ndtr(b) + math.log1p(-math.exp(min(log_ndtr(a) - log_ndtr(b), -1e-12)))
+    return -0.5 * ((at - mean) / std) ** 2 - math.log(std * math.sqrt(2 * math.pi)) - inside
+
+
+def resting(slope: float, curvature: float) -> float:
+    """Log of int_0^inf exp(-slope x - curvature x^2 / 2) dx: what a parameter on its bound has beside it."""
+    h = max(curvature, 1e-300)
+    return 0.5 * math.log(math.pi / (2 * h)) + math.log(erfcx(max(slope, 0.0) / math.sqrt(2 * h)))
+
+
+def weigh(
+    scales: Scales,
+    keys: Sequence[str],
+    start: Mapping[str, float],
+    criteria: Criteria,
+    v: Float[np.ndarray, " K"] | None = None,
+    wide: Mapping[str, float] | None = None,
+    label: str = "",
+    rounds: int = ROUNDS,
+    iterations: int = 12,
+    floor: float = -math.inf,
+) -> Weighed:
+    """Fit the set `keys` from `start` and weigh it.
+
+    Args:
+        v: squared amplitudes to begin with; of their prior's size by default.
+        wide: prior widths by family that differ from the criteria's (something unknown; a gain that is a name).
+        label: name of such a hypothesis.
+        floor: log evidence below which the set is hopeless and not followed further.
+    """
+    names = scales.bench.fitted
+    widths = scales.priors(criteria, wide or {})
+    v = widths**2 if v is None else v
+    bench, priors = with_priors(scales, keys, start, criteria)
+    y, best = scales.cut.mean(bench.y), None
+    at, tolerance, raw = dict(start), 0.5, None
+    parts = scales.about(bench.predict(at))
+    for turn in range(rounds):
+        misfit = Whitening(bench, scales.cut, scales.blocked, parts, v)
+        seed = None if raw is None else misfit.whiten_means(raw)
+        fit = refit(bench, misfit, keys, at, iterations=iterations, tolerance=tolerance, errors=False, seed=seed)
+        if not np.isfinite(fit.chi2):
+            break
+        descent = Descent(bench, misfit, tuple(fit.values), names, {})
+        x = descent.point(fit.values)
+        span = np.minimum(
+            np.where(np.isfinite(descent.high - descent.low), descent.high - descent.low, 1.0), descent.scale
+        )
+        bound = (x - descent.low < 1e-6 * span) | (descent.high - x < 1e-6 * span)
+        raw = scales.cut.mean(bench.jacobian(fit.values, descent.paths, names))
+        jac = raw * np.where(descent.log, [fit.values[p] for p in descent.paths], 1.0)
+        residual, parts = y - scales.cut.mean(fit.prediction), scales.about(fit.prediction)
+        prior = [priors.get(p) for p in descent.paths]
+        weak = np.array([0.0 if p is None else p[1] ** -2 for p in prior])
+        offset = np.array([0.0 if p is None else a - p[0] for a, p in zip(x, prior, strict=True)])
+        linear = Linear(residual, jac[:, ~bound], offset[~bound], weak[~bound])
+        v, m = amplitudes(linear, parts, widths, scales.blocked, v)
+        value = m.value + 0.5 * int(np.sum(~bound)) * math.log(2 * math.pi)
+        value += sum(
+            log_prior(bench.free[p], a, q) + 0.5 * w * o * o
+            for p, a, q, w, o in zip(descent.paths, x, prior, weak, offset, strict=True)
+            if q is not None
+        )
+        # what rests on a bound was left out of the integral: its own factor, and its prior's square, follow
+        held = _on_bounds(scales, parts, v, residual, jac, x, descent, bound, weak, offset)
+        occam = amplitude_mass(m, v, widths)
+        total = value + held + occam
+        if best is None or total > best[0] + 1e-6:
+            gained = math.inf if best is None else total - best[0]
+            best = (total, value + held, occam, fit, v, m, bound, descent, residual, parts)
+        else:
+            break
+        if gained < SETTLED or total < floor:
+            break
+        at, tolerance = dict(fit.values), 0.1
+    if best is None:
+        return _impossible(scales, keys, label)
+    return _described(scales, keys, label, best)
+
+
+def _on_bounds(scales, parts, v, residual, jac, x, descent, bound, weak, offset) -> float:
+    """Log mass beside the bounds of what rests on them, the other parameters held."""
+    if not bound.any():
+        return 0.0
+    inverse = [np.linalg.inv(b) for b in scales.blocked.within(parts, v)]
+    u = smooth(parts, v)
+
+    def solve(a: np.ndarray) -> np.ndarray:
+        light = np.concatenate([i @ a[r] for i, r in zip(inverse, scales.blocked.rows, strict=True)])
+        return light
+
+    g = solve(u)
+    inner = np.eye(u.shape[1]) + u.T @ g
+
+    def whole(a: np.ndarray) -> np.ndarray:
+        light = solve(a)
+        return light - g @ np.linalg.solve(inner, u.T @ light)
+
+    w, total = whole(residual), 0.0
+    for i in np.flatnonzero(bound):
+        side = 1.0 if x[i] - descent.low[i] <= descent.high[i] - x[i] else -1.0
+        slope = side * float(weak[i] * offset[i] - jac[:, i] @ w)
+        curvature = float(jac[:, i] @ whole(jac[:, i]) + weak[i])
+        if curvature > 0:
+            total += resting(slope, curvature) - 0.5 * float(weak[i] * offset[i] ** 2)
+    return total
+
+
+def _impossible(scales: Scales, keys: Sequence[str], label: str) -> Weighed:
+    """A set whose model can't be predicted anywhere near."""
+    names = tuple(dict.fromkeys(scales.bench.candidates[k].name for k in keys))
+    n = len(scales.cut.starts)
+    low = SetEvidence(
+        tuple(keys), names, label, -math.inf, -math.inf, 0.0, 0.0, {}, 0, (), True, math.inf, n, 0.0, 0.0, (0.0, 0.0)
+    )
+    none = np.full(len(scales.bench.y), np.nan)
+    fit = Refit(tuple(keys), {}, {}, {}, (), math.inf, n, math.inf, 0, False, none)
+    return Weighed(low, fit, np.zeros(len(scales.families)), (), np.zeros(n))
+
+
+def _described(scales: Scales, keys: Sequence[str], label: str, best: tuple) -> Weighed:
+    total, value, occam, fit, v, m, bound, descent, residual, parts = best
+    bench = scales.bench
+    smoothed, scatter = _rest(scales, parts, v, residual)
+    chi2 = float(np.sum((residual / scales.blocked.sigma) ** 2))
+    before = scales.cut.mean(bench.y - bench.predict(scales.values)) / scales.blocked.sigma
+    n = len(residual)
+    base = max(float(before @ before) - n, 1e-9)
+    whitened = Whitening(bench, scales.cut, scales.blocked, parts, v).residual(fit.prediction, bench.fitted)
+    at_bound = tuple(p for p, b in zip(descent.paths, bound, strict=True) if b)
+    void = any(all(p in at_bound and _neutral(bench, fit, p) for p in bench.candidates[k].amplitudes) for k in keys)
+    own = 0.5 * float(np.linalg.slogdet(m.precision)[1]) if len(m.precision) else 0.0
+    density = m.value + own  # what is left of the evidence when the parameters' width is taken out of it
+    evidence = SetEvidence(
+        keys=tuple(keys),
+        names=tuple(dict.fromkeys(bench.candidates[k].name for k in keys)),
+        label=label,
+        log_evidence=total,
+        fit=density,
+        parameters=value - density,
+        discrepancy=occam,
+        amplitudes={p.name: math.sqrt(x) for p, x in zip(parts, v, strict=True)},
+        k=len(fit.values),
+        at_bound=at_bound,
+        void=void,
+        chi2=chi2,
+        n=n,
+        kurtosis=float(kurtosis(whitened)),
+        explained=float(np.clip(1 - max(chi2 - n, 0.0) / base, -1.0, 1.0)),
+        rest=(float(np.mean(smoothed**2 + scatter)) / scales.peak**2, _wobble(smoothed, scatter, scales.peak)),
+    )
+    return Weighed(evidence, fit, v, parts, smoothed)
+
+
+def _neutral(bench: Bench, fit: Refit, path: str) -> bool:
+    scale = bench.free[path].scale
+    return abs(fit.values[path] - bench.start[path]) <= 1e-6 * scale
+
+
+def _rest(scales: Scales, parts: Sequence[Part], v: Float[np.ndarray, " K"], residual: Float[np.ndarray, " M"]):
+    """Posterior mean and variance of the discrepancy at the blocks, scatter from sample to sample left out."""
+    white = np.array([p.family == "white" for p in parts])
+    noise = Blocked(scales.blocked.rows, scales.blocked.sigma)
+    inverse = [np.linalg.inv(b) for b in noise.within(parts, v)]
+    u = smooth(parts, v)
+    light = np.concatenate([i @ residual[r] for i, r in zip(inverse, noise.rows, strict=True)])
+    g = np.concatenate([i @ u[r] for i, r in zip(inverse, noise.rows, strict=True)])
+    inner = np.linalg.inv(np.eye(u.shape[1]) + u.T @ g)
+    w = light - g @ (inner @ (g.T @ residual))
+    # y = d + e with var(e) = N: mean of d is y - N K^-1 y, its variance N - N K^-1 N
+    scattered = noise.within([p for p, x in zip(parts, white, strict=True) if x], v[white])
+    errors = np.concatenate([np.diag(s) for s in scattered])
+    own = np.concatenate([np.diag(i) for i in inverse]) - np.sum((g @ inner) * g, axis=1)
+    return residual - errors * w, np.maximum(errors - errors**2 * own, 0.0)
+
+
+def _wobble(mean: np.ndarray, variance: np.ndarray, peak: float) -> float:
+    """Standard deviation of the mean square of a normal vector, entries taken in independent tens."""
+    each = 2 * variance**2 + 4 * variance * mean**2
+    return math.sqrt(10 * float(np.sum(each))) / len(mean) / peak**2

@@ -1,0 +1,163 @@
+"""What a model leaves of real recordings though no physics is missing that has a name: a Gaussian process with parts.
+
+    y = f(theta) + d + noise,     d ~ GP(0, sum_k a_k^2 B_k),
+
+the model of Kennedy and O'Hagan (2001), with the parts that rests of material tests are seen to have:
+
+| part | form of B |
+|---|---|
+| law | squared exponential in strain (0.5 and 0.12 of the range) times the stress, shared by the recordings of a mode |
+| gain | constant times the stress, of each recording's own |
+| hysteresis | squared exponential in strain (0.4) times a rate-independent loading state in three shapes, shared by a mode |
+| slow | exponential in time (0.05, 0.25 and 1.5 of the recording), of each recording's own |
+| white | what scatters from sample to sample beyond the stated noise |
+
+Amplitudes a_k are shares of the stress that the model predicts (law, gain) or of its peak in the recording. Of what the
+model predicts: about the stress of another model a gain could bring that model's answer in.
+
+Source: Kennedy and O'Hagan 2001, J. R. Statist. Soc. B 63; the loading state: Krasnosel'skii and Pokrovskii 1989.
+"""
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+LAW = {"law": 0.5, "fine law": 0.12}  # correlation lengths, of the range of strain
+ALIKE = 0.4  # correlation length of hysteresis, of the range of strain
+STATES = {"step": 0.01, "narrow": 0.06, "wide": 0.3}  # path over which the loading state turns, of the range
+SLOW = {"quick": 0.05, "slow": 0.25, "lasting": 1.5}  # correlation times, of a recording's duration
+LEFT_OUT = 1e-5  # of the largest eigenvalue: what smooth parts are cut off at
+BAND = 0.005  # of the range: a drive that trembles by less has not turned round
+
+
+@dataclass(frozen=True)
+class Series:
+    """One series of measurements, as the discrepancy sees it.
+
+    Attributes:
+        recording: it belongs to.
+        mode: series that may share a law: kind of test, direction, component.
+        time: s.
+        strain: ln stretch or shear along every driven direction.
+        states: loading states (`loading_states`), one column a shape.
+        peak: typical largest stress of its recording, Pa.
+    """
+
+    recording: str
+    mode: Hashable
+    time: Float[np.ndarray, " n"]
+    strain: Float[np.ndarray, "n k"]
+    states: Float[np.ndarray, "n 3"]
+    peak: float
+
+
+@dataclass(frozen=True)
+class Part:
+    """One part of the discrepancy: its covariance is share^2 times B, of one of two forms.
+
+    Attributes:
+        name: e.g. "gain", "hysteresis, wide".
+        family: "law", "gain", "hysteresis", "slow" or "white".
+        factor: B = factor factor' (smooth parts have few columns), or None.
+        within: B is block-diagonal, a block for each series; or None.
+    """
+
+    name: str
+    family: str
+    factor: Float[np.ndarray, "N r"] | None = None
+    within: tuple[Float[np.ndarray, "n n"], ...] | None = None
+
+
+def loading_states(strain: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
+    """Where a series is between loading (1) and unloading (-1), in the shapes of `STATES`; 0 before it has moved.
+
+    h' = |x'| (sign x' - h) / w along the path, w a share of the range: it depends on the order of strains alone, not
+    on their rate (a play operator takes out what trembles by less than `BAND`).
+    """
+    span = float(np.ptp(strain)) or 1.0
+    band, played = BAND * span, np.empty(len(strain))
+    at = float(strain[0])
+    for i, x in enumerate(strain.tolist()):
+        at = min(max(at, x - band), x + band)
+        played[i] = at
+    step = np.diff(played, prepend=played[0]) / span
+    out = np.zeros((len(strain), len(STATES)))
+    h = np.zeros(len(STATES))
+    widths = np.array(list(STATES.values()))
+    for i in np.flatnonzero(step):
+        h = np.sign(step[i]) + (h - np.sign(step[i])) * np.exp(-abs(step[i]) / widths)
+        out[i] = h
+    last = np.maximum.accumulate(np.where(step != 0, np.arange(len(step)), -1))
+    return np.where(last[:, None] >= 0, out[np.maximum(last, 0)], 0.0)
+
+
+def smooth_factor(x: Float[np.ndarray, "n k"], length: float) -> Float[np.ndarray, "n r"]:
+    """U with U U' = exp(-1/2 |x - x'|^2 / length^2), to `LEFT_OUT` of the largest eigenvalue; x in units of its range."""
+    x = x / max(float(np.max(np.ptp(x, axis=0))), 1e-12)
+    matrix = np.exp(-0.5 * np.sum((x[:, None] - x[None]) ** 2, axis=-1) / length**2)
+    values, vectors = np.linalg.eigh(matrix)
+    kept = values > LEFT_OUT * values[-1]
+    return vectors[:, kept] * np.sqrt(values[kept])
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """All parts of the discrepancy of some series; laws and gains scale with what a model predicts.
+
+    Attributes:
+        laws: factors of the laws about a stress of one, by name.
+        belongs: a column for every recording, one where a row belongs to it.
+        fixed: the parts that don't depend on the prediction.
+    """
+
+    laws: tuple[tuple[str, Float[np.ndarray, "N r"]], ...]
+    belongs: Float[np.ndarray, "N R"]
+    fixed: tuple[Part, ...]
+
+    def about(self, prediction: Float[np.ndarray, " N"]) -> tuple[Part, ...]:
+        """The parts beside this prediction, Pa; always in the same order."""
+        stress = prediction[:, None]
+        laws = tuple(Part(name, "law", stress * factor) for name, factor in self.laws)
+        return (*laws, Part("gain", "gain", stress * self.belongs), *self.fixed)
+
+
+def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"]) -> Discrepancy:
+    """The discrepancy of these series, stacked in their order.
+
+    Args:
+        sigma: noise of each entry, Pa; entries that are means of more samples scatter less.
+    """
+    of = np.repeat(np.arange(len(series)), [len(s.time) for s in series])
+    peak = np.array([s.peak for s in series])[of]
+    states = np.concatenate([s.states for s in series])
+    modes = [np.flatnonzero([s.mode == m for s in series]) for m in dict.fromkeys(s.mode for s in series)]
+
+    def shared(length: float) -> Float[np.ndarray, "N r"]:
+        """Factors of all modes side by side."""
+        columns = []
+        for members in modes:
+            own = smooth_factor(np.concatenate([series[i].strain for i in members]), length)
+            whole = np.zeros((len(of), own.shape[1]))
+            whole[np.isin(of, members)] = own
+            columns.append(whole)
+        return np.concatenate(columns, axis=1)
+
+    recordings = list(dict.fromkeys(s.recording for s in series))
+    belongs = np.array([recordings.index(s.recording) for s in series])[of]
+    near = peak[:, None] * shared(ALIKE)
+    out = [Part(f"hysteresis, {shape}", "hysteresis", near * states[:, i, None]) for i, shape in enumerate(STATES)]
+    for name, time in SLOW.items():
+        blocks = []
+        for s in series:
+            elapsed = s.time / (float(np.ptp(s.time)) or 1.0)
+            blocks.append(s.peak**2 * np.exp(-np.abs(elapsed[:, None] - elapsed) / time))
+        out.append(Part(name, "slow", within=tuple(blocks)))
+    scatter = []
+    for i, s in enumerate(series):
+        own = sigma[of == i]
+        scatter.append(np.diag((s.peak * own / max(float(np.median(own)), 1e-300)) ** 2))
+    out.append(Part("white", "white", within=tuple(scatter)))
+    laws = tuple((name, shared(length)) for name, length in LAW.items())
+    return Discrepancy(laws, (belongs[:, None] == np.arange(len(recordings))).astype(float), tuple(out))
