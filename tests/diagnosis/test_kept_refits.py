@@ -1,20 +1,14 @@
-"""A diagnosis of material tests that was stopped goes on from the refits that it had finished."""
-
-import json
+"""Refits that were finished are found again for the same question, and for no other."""
 
 import numpy as np
-import pytest
 from spring_bench import spring
 
 from tissuejax.cache import source
-from tissuejax.diagnosis import kept_refits
 from tissuejax.diagnosis.diagnose import diagnose
 from tissuejax.diagnosis.kept_refits import KeptRefits
 from tissuejax.diagnosis.misfit import Misfit, white
 from tissuejax.diagnosis.search import Budget
 from tissuejax.recordings.recording import Channel, Recording, Sample
-
-QUICK = {"energy": "neo-hookean", "effects": ("drift", "aging"), "budget": Budget(most=2)}
 
 
 def sample(offset: float = 30.0) -> Sample:
@@ -28,51 +22,6 @@ def sample(offset: float = 30.0) -> Sample:
             name, "uniaxial", {"time": time, "stretch": stretch}, {"nominal_stress": channel}, {"start": 100.0 * i}
         )
     return Sample("s", made)
-
-
-@pytest.fixture
-def counted(monkeypatch):
-    """Counts refits; stops at the one whose number is set."""
-    seen = {"run": 0, "stop": -1}
-    whole = kept_refits.refit
-
-    def refit(*args, **options):
-        if seen["run"] == seen["stop"]:
-            raise KeyboardInterrupt
-        seen["run"] += 1
-        return whole(*args, **options)
-
-    monkeypatch.setattr(kept_refits, "refit", refit)
-    return seen
-
-
-def answer(found) -> str:
-    """All that is said, without the time it took."""
-    return json.dumps({k: v for k, v in found.as_dict().items() if k != "seconds"}, default=str)
-
-
-def test_a_stopped_diagnosis_goes_on_and_says_the_same(tmp_path, counted):
-    whole = diagnose(sample(), **QUICK)
-    all_of_them, counted["run"], counted["stop"] = counted["run"], 0, 4
-    with pytest.raises(KeyboardInterrupt):
-        diagnose(sample(), out=tmp_path, **QUICK)
-    with open(tmp_path / "runs" / kept_refits.FILE, "a") as file:
-        file.write('{"mark": "cut o')  # stopped while it was writing
-    counted["run"], counted["stop"] = 0, -1
-    found = diagnose(sample(), out=tmp_path, **QUICK)
-    assert counted["run"] == all_of_them - 4
-    assert answer(found) == answer(whole)
-    assert not (tmp_path / "runs").exists()
-
-
-def test_what_was_kept_of_another_sample_is_not_taken(tmp_path, counted):
-    counted["stop"] = 4
-    with pytest.raises(KeyboardInterrupt):
-        diagnose(sample(), out=tmp_path, **QUICK)
-    counted["run"], counted["stop"] = 0, 1
-    with pytest.raises(KeyboardInterrupt):
-        diagnose(sample(31.0), out=tmp_path, **QUICK)
-    assert counted["run"] == 1
 
 
 def test_what_was_kept_counts_only_for_the_same_question(tmp_path, monkeypatch):
@@ -109,6 +58,5 @@ def test_what_was_kept_counts_only_for_the_same_question(tmp_path, monkeypatch):
 
 def test_a_search_ends_when_its_budget_is_spent_and_says_so():
     found = diagnose(sample(), energy="neo-hookean", effects=("drift", "aging"), budget=Budget(most=2, spend=(1.0,)))
-    assert any("budget was spent" in w for w in found.as_dict()["warnings"])
-    assert [k for k in found.search.refits if k] == []
-    assert found.verdict.kind == "unexplained"
+    assert any("was spent" in w for w in found.as_dict()["warnings"])
+    assert found.as_dict()["effects"] == []

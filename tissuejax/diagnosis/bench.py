@@ -78,6 +78,8 @@ class Candidate:
         held: paths that held-out recordings have for themselves (offsets, phases), fitted there.
         nominated: False for forms that are only reached from their neighbours.
         beside: keys of the poorer and the richer form.
+        widens: families of the discrepancy that may be far larger where this acts, with the width of their prior; such
+            a candidate has no parameters of its own.
     """
 
     name: str
@@ -89,6 +91,7 @@ class Candidate:
     held: tuple[str, ...] = ()
     nominated: bool = True
     beside: tuple[str, ...] = ()
+    widens: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def key(self) -> str:

@@ -12,8 +12,12 @@ from threadpoolctl import threadpool_limits
 from tissuejax.cache.programs import keep_programs
 from tissuejax.diagnosis.decide import decide
 from tissuejax.diagnosis.foreseen import OPEN, foreseen
-from tissuejax.diagnosis.kept_refits import KeptRefits
-from tissuejax.diagnosis.material import MaterialBench
+from tissuejax.diagnosis.judgement.answer import Answered, answer, evidence_file
+from tissuejax.diagnosis.judgement.evidence import write_evidence
+from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.judge import Kind
+from tissuejax.diagnosis.judgement.material_diagnosis import MaterialDiagnosis
+from tissuejax.diagnosis.material import MaterialBench, modes
 from tissuejax.diagnosis.next_experiment import proposals, settling
 from tissuejax.diagnosis.next_probing import probing_proposals
 from tissuejax.diagnosis.probing import ProbingBench
@@ -21,10 +25,11 @@ from tissuejax.diagnosis.probing_map import stiffness_maps
 from tissuejax.diagnosis.probing_search import BUDGET as PROBING
 from tissuejax.diagnosis.probing_search import search_probing
 from tissuejax.diagnosis.result import Diagnosis
-from tissuejax.diagnosis.search import Budget, search
+from tissuejax.diagnosis.offered import offered
+from tissuejax.diagnosis.search import Budget, Search
 from tissuejax.diagnosis.sigma import sigmas
-from tissuejax.diagnosis.untimed import timed, without_clock
 from tissuejax.effects.catalogue import effects as all_effects
+from tissuejax.energies.energy import Energy
 from tissuejax.energies.catalogue import energy as named_energy
 from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.catalogue import experiment
@@ -81,10 +86,10 @@ def diagnose(
     else:
         sigma, more = sigmas(sample, (*fitted, *held_out))
         bench = MaterialBench.of(sample, base, fitted, held_out, sigma, effects)
-        remarks += more
-        if not timed(sample):
-            bench.candidates = without_clock(bench.candidates)
-            remarks.append("no time was recorded: effects that act in time (relaxation, drift, aging) were not tried")
+        whole = MaterialBench.of(sample, base, (*fitted, *held_out), (), sigma, effects)
+        for b in (bench, whole):
+            b.candidates, left_out = offered(sample, b.candidates, effects)
+        remarks += more + left_out
     bench.warnings += remarks
     if bad := [f"{s.recording} {s.label}" for s in bench.segments if not np.all(np.isfinite(bench.y[s.rows]))]:
         raise InputError(f"{sample.name}: {', '.join(bad)}: values that are not finite; leave these samples out")
@@ -103,29 +108,39 @@ def diagnose(
         if kind == "probing":
             found = search_probing(bench, budget, told)
         else:
-            found = search(bench, budget, told, KeptRefits(bench, keep))
-            bench.warnings += [] if more else found.misfit.remarks()  # of noise that was recorded
-    verdict = decide(found)
-    if kind == "homogeneous":
-        ideas = settling([proposals(sample, base, bench, verdict.chosen, r, None) for r in verdict.rivals[:3]])
-    else:  # each planned press is a simulation
-        ideas = settling([probing_proposals(sample, bench, verdict.chosen, r, None) for r in verdict.rivals[:1]])
-    maps = []
-    if kind == "probing" and verdict.kind != "nothing-missing":
-        maps = stiffness_maps(bench, found.empty.values, found.empty.prediction)
-    open_ends = []
-    if kind == "homogeneous" and verdict.kind != "unexplained":  # a probing's derivative is minutes of simulations
-        open_ends = foreseen(bench, found.misfit, verdict.chosen)
-        bench.warnings += [x.sentence(verdict.chosen) for x in open_ends if x.over_noise > OPEN]
-    diagnosis = Diagnosis(sample.name, energy, found, verdict, time.perf_counter() - begun, ideas, maps, open_ends)
-    if kind == "probing":
-        bench.runs.forget()
-    else:
-        found.kept.forget()
+            effort = Effort(most=budget.most, spend=budget.spend[-1]) if budget else Effort()
+            found = answer(bench, whole, modes(whole), effort, told)
+    made = _probing(sample, energy, bench, found) if kind == "probing" else _material(sample, energy, base, bench, found)
+    made.seconds = time.perf_counter() - begun
     if out is not None:
-        write_json(Path(out) / "result.json", diagnosis.as_dict())
-        write_json(Path(out) / "remainder.json", diagnosis.remainders())
-    return diagnosis
+        write_json(Path(out) / "result.json", made.as_dict())
+        write_json(Path(out) / "remainder.json", made.remainders())
+        if kind != "probing":
+            write_evidence(found.evidence, evidence_file(Path(out)))
+    return made
+
+
+def _probing(sample: Sample, energy: str, bench: ProbingBench, found: Search) -> Diagnosis:
+    verdict = decide(found)
+    # each planned press is a simulation
+    ideas = settling([probing_proposals(sample, bench, verdict.chosen, r, None) for r in verdict.rivals[:1]])
+    maps = []
+    if verdict.kind != "nothing-missing":
+        maps = stiffness_maps(bench, found.empty.values, found.empty.prediction)
+    bench.runs.forget()
+    return Diagnosis(sample.name, energy, found, verdict, 0.0, ideas, maps)
+
+
+def _material(sample: Sample, energy: str, base: Energy, bench: MaterialBench, found: Answered) -> MaterialDiagnosis:
+    ideas = settling([proposals(sample, base, found.bench, found.chosen, r, None) for r in found.rivals[:3]])
+    open_ends = []
+    if found.kind != Kind.UNEXPLAINED:
+        keys = frozenset(found.chosen.keys)
+        open_ends = foreseen(found.bench, found.whitenings[keys], found.plain[keys])
+        bench.warnings += [x.sentence(found.chosen) for x in open_ends if x.over_noise > OPEN]
+    if found.evidence.exhausted:
+        bench.warnings.append("what may be spent on predictions was spent: larger sets of effects were not all weighed")
+    return MaterialDiagnosis(sample.name, energy, found, found, 0.0, ideas, [], open_ends)
 
 
 def split(sample: Sample, holdout: str | Sequence[str] | None) -> tuple[tuple[str, ...], tuple[str, ...], list[str]]:

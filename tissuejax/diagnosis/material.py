@@ -352,3 +352,11 @@ class MaterialBench(Bench):
             if s.recording in self.fitted
         ]
         return [{"effects.periodic.frequency": f} for f in lines(series, 3)]
+
+
+def modes(bench: MaterialBench) -> dict[str, tuple]:
+    """By recording, what kind of test it is and along which axes: those alike may share a law."""
+    return {
+        n: (t.mode, float(t.second), float(t.swell), tuple(np.round(t.frame, 6).ravel().tolist()))
+        for n, t in bench._tests.items()
+    }

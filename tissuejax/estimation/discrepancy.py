@@ -8,7 +8,7 @@ the model of Kennedy and O'Hagan (2001), with the parts that rests of material t
 |---|---|
 | law | squared exponential in strain (0.5 and 0.12 of the range) times the stress, shared by the recordings of a mode |
 | gain | constant times the stress, of each recording's own |
-| hysteresis | squared exponential in strain (0.4) times a rate-independent loading state in three shapes, shared by a mode |
+| hysteresis | squared exponential in strain (0.4) times a loading state, in three shapes, shared by a mode |
 | slow | exponential in time (0.05, 0.25 and 1.5 of the recording), of each recording's own |
 | white | what scatters from sample to sample beyond the stated noise |
 
@@ -94,7 +94,7 @@ def loading_states(strain: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
 
 
 def smooth_factor(x: Float[np.ndarray, "n k"], length: float) -> Float[np.ndarray, "n r"]:
-    """U with U U' = exp(-1/2 |x - x'|^2 / length^2), to `LEFT_OUT` of the largest eigenvalue; x in units of its range."""
+    """U with U U' = exp(-1/2 |x - x'|^2 / length^2), to `LEFT_OUT` of the largest eigenvalue; x over its range."""
     x = x / max(float(np.max(np.ptp(x, axis=0))), 1e-12)
     matrix = np.exp(-0.5 * np.sum((x[:, None] - x[None]) ** 2, axis=-1) / length**2)
     values, vectors = np.linalg.eigh(matrix)

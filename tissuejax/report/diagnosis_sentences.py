@@ -8,7 +8,9 @@ from tissuejax.diagnosis.misfit import Misfit
 from tissuejax.diagnosis.quality import SIGNIFICANT
 from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.result import Diagnosis
+from tissuejax.diagnosis.judgement.material_diagnosis import MaterialDiagnosis
 from tissuejax.effects.catalogue import effects
+from tissuejax.report import judged_sentences
 from tissuejax.report.scales import with_std
 
 
@@ -24,6 +26,8 @@ def names_of(d: Diagnosis) -> list[str]:
 
 def lead(d: Diagnosis) -> str:
     """The verdict in one or two sentences."""
+    if isinstance(d, MaterialDiagnosis):
+        return judged_sentences.lead(d)
     v, s = d.verdict, d.search
     chi = s.empty.chi2 / s.empty.n
     after = f"chi² per sample {chi:.2f} before, {v.chosen.chi2 / v.chosen.n:.2f} after"
@@ -49,6 +53,8 @@ def lead(d: Diagnosis) -> str:
 
 def sure(d: Diagnosis) -> list[str]:
     """How sure, in numbers."""
+    if isinstance(d, MaterialDiagnosis):
+        return judged_sentences.sure(d)
     v, s, out = d.verdict, d.search, []
     b, q = v.base_quality, v.quality
 
@@ -128,7 +134,7 @@ def next_steps(d: Diagnosis) -> list[str]:
             "Nothing is asked for by these recordings. What they are blind to (other rates, directions, kinds of test) "
             "they can't speak of; a recording unlike these, held out, is the next test of the model."
         ]
-    if kind == "found":
+    if kind in ("found", "found-in-part"):
         return [
             "No further recording is needed to tell the candidates apart. A second specimen, with the effects held at "
             "these values and only the base refitted, would show whether they belong to the material."

@@ -17,8 +17,8 @@ class Criteria:
             likely as two effects at once; taken off the others in proportion.
         shares: standard deviation of the half-normal prior of a discrepancy's amplitude, a share of the stress, by
             family. Ground: what the best published laws leave of careful recordings, 1 to 4 % of the peak in all.
-        strange: the same where something unknown acts, by which factor more. Ground: 10 makes of 1 to 2 % the 10 to 20 %
-            by which effects of the catalogue change a recording.
+        strange: the same where something unknown acts, by which factor more. Ground: 10 makes of 1 to 2 % the 10 to
+            20 % by which effects of the catalogue change a recording.
         change: standard deviation of the half-normal (two-sided: normal) prior of an effect's amplitude: the change of
             the stress that it makes alone, as a share of the stress (root mean squares). Ground: effects worth a name
             are some per cent to a half of what is measured.

@@ -123,7 +123,7 @@ class Exploration:
         key = frozenset(order)
         if key in self.weighed and not options:
             return self.weighed[key]
-        if len(order) > 1 and self.bench.spent > self.effort.spend:
+        if order and self.bench.spent > self.effort.spend:
             self.exhausted = True
             return None
         self.report(" + ".join(order) or "base model")
@@ -147,7 +147,10 @@ class Exploration:
         left = [
             c
             for c in self.bench.candidates.values()
-            if c.name not in names and c.nominated and self.bench.burden((*key, c.key)) <= self.effort.burden
+            if c.name not in names
+            and c.nominated
+            and c.amplitudes
+            and self.bench.burden((*key, c.key)) <= self.effort.burden
         ]
         values, bench, scales = at.refit.values, self.bench, self.scales
         prediction = at.refit.prediction
@@ -203,7 +206,8 @@ class Exploration:
         """Weigh sets with one effect more: the best nominees of every parent in turn."""
         lists = []
         for key in parents:
-            seen: dict[str, list[Score]] = {}
+            free = [c for c in self.bench.candidates.values() if c.widens and c.name not in self.names(key)]
+            seen = {c.name: [Score(c.key, math.inf, 0.0, {}, {}, np.zeros(0), ((0.0, {}, {}),))] for c in free}
             for s in self.score(key):
                 if s.gain < LITTLE:
                     break

@@ -1,8 +1,8 @@
 """The evidence of a linearised model under noise and discrepancy, as a function of the discrepancy's amplitudes.
 
 Near a fit theta the residual is r - J delta, with r = y - f(theta). With delta integrated over its prior (precision
-`weak`, centred where the prior is), K = D + U V U', where D is block-diagonal (noise, slow parts) and U holds the smooth
-parts, and H = J'K^-1 J + weak,
+`weak`, centred where the prior is), K = D + U V U', where D is block-diagonal (noise, slow parts) and U holds the
+smooth parts, and H = J'K^-1 J + weak,
 
     log p(y | v) = -1/2 (r'K^-1 r + o'weak o - b'H^-1 b) - 1/2 log|K| - 1/2 log|H| + const,   b = J'K^-1 r - weak o,
 
@@ -10,8 +10,8 @@ o being theta less the prior's mean. Smooth parts and parameters are handled ali
 precisions 1 and `weak`: all costs are those of the blocks. Amplitudes a = sqrt(v) have half-normal priors, so in v the
 whole has a slope at zero and an amplitude can rest there.
 
-Source: restricted likelihood, Harville 1977, JASA 72; Woodbury's identity; Laplace's method for posterior mass, Kass and
-Raftery 1995, JASA 90, sec. 4.1.
+Source: restricted likelihood, Harville 1977, JASA 72; Woodbury's identity; Laplace's method for posterior mass, Kass
+and Raftery 1995, JASA 90, sec. 4.1.
 """
 
 import math

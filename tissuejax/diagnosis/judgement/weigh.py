@@ -161,13 +161,14 @@ def weigh(
         floor: log evidence below which the set is hopeless and not followed further.
     """
     names = scales.bench.fitted
-    widths = scales.priors(criteria, wide or {})
+    wide = {f: w for key in keys for f, w in scales.bench.candidates[key].widens.items()} | dict(wide or {})
+    widths = scales.priors(criteria, wide)
     v = widths**2 if v is None else v
     bench, priors = with_priors(scales, keys, start, criteria)
     y, best = scales.cut.mean(bench.y), None
     at, tolerance, raw = dict(start), 0.5, None
     parts = scales.about(bench.predict(at))
-    for turn in range(rounds):
+    for _turn in range(rounds):
         misfit = Whitening(bench, scales.cut, scales.blocked, parts, v)
         seed = None if raw is None else misfit.whiten_means(raw)
         fit = refit(bench, misfit, keys, at, iterations=iterations, tolerance=tolerance, errors=False, seed=seed)
@@ -218,8 +219,7 @@ def _on_bounds(scales, parts, v, residual, jac, x, descent, bound, weak, offset)
     u = smooth(parts, v)
 
     def solve(a: np.ndarray) -> np.ndarray:
-        light = np.concatenate([i @ a[r] for i, r in zip(inverse, scales.blocked.rows, strict=True)])
-        return light
+        return np.concatenate([i @ a[r] for i, r in zip(inverse, scales.blocked.rows, strict=True)])
 
     g = solve(u)
     inner = np.eye(u.shape[1]) + u.T @ g
@@ -260,7 +260,7 @@ def _described(scales: Scales, keys: Sequence[str], label: str, best: tuple) -> 
     base = max(float(before @ before) - n, 1e-9)
     whitened = Whitening(bench, scales.cut, scales.blocked, parts, v).residual(fit.prediction, bench.fitted)
     at_bound = tuple(p for p, b in zip(descent.paths, bound, strict=True) if b)
-    void = any(all(p in at_bound and _neutral(bench, fit, p) for p in bench.candidates[k].amplitudes) for k in keys)
+    void = any(_resting(bench.candidates[k], fit, bench, at_bound, v, scales.families) for k in keys)
     own = 0.5 * float(np.linalg.slogdet(m.precision)[1]) if len(m.precision) else 0.0
     density = m.value + own  # what is left of the evidence when the parameters' width is taken out of it
     evidence = SetEvidence(
@@ -284,9 +284,12 @@ def _described(scales: Scales, keys: Sequence[str], label: str, best: tuple) -> 
     return Weighed(evidence, fit, v, parts, smoothed)
 
 
-def _neutral(bench: Bench, fit: Refit, path: str) -> bool:
-    scale = bench.free[path].scale
-    return abs(fit.values[path] - bench.start[path]) <= 1e-6 * scale
+def _resting(c: Candidate, fit: Refit, bench: Bench, at_bound: Sequence[str], v: np.ndarray, families) -> bool:
+    """Whether all that a candidate may do is at nothing."""
+    if c.widens:
+        return not any(x > 0 for f, x in zip(families, v, strict=True) if f in c.widens)
+    near = (abs(fit.values[p] - bench.start[p]) <= 1e-6 * bench.free[p].scale for p in c.amplitudes)
+    return all(p in at_bound and n for p, n in zip(c.amplitudes, near, strict=True))
 
 
 def _rest(scales: Scales, parts: Sequence[Part], v: Float[np.ndarray, " K"], residual: Float[np.ndarray, " M"]):

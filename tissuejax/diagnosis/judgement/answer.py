@@ -1,0 +1,181 @@
+"""A judgement in the terms of a diagnosis: what the page shows, and what is said of recordings held out.
+
+All recordings choose the set, those called held out too: they are measurements like the others. What is reported of a
+recording held out is another thing: the base and the set that was chosen are fitted to the other recordings alone,
+nothing at all is fitted to it, and its error is that of the prediction.
+"""
+
+import copy
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from tissuejax.diagnosis.bench import Bench
+from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.evidence import Evidence
+from tissuejax.diagnosis.judgement.explore import Effort, Exploration, explore
+from tissuejax.diagnosis.judgement.judge import Judgement, Kind, covering, judge
+from tissuejax.diagnosis.judgement.whitening import Whitening
+from tissuejax.diagnosis.misfit import Misfit, white
+from tissuejax.diagnosis.refit import Refit, refit
+from tissuejax.diagnosis.score import Score
+
+
+@dataclass
+class Answered:
+    """A judged sample, with the fits that its page shows.
+
+    Attributes:
+        bench: fitted and held-out recordings as the user named them.
+        exploration: all that was weighed.
+        judgement: the answer.
+        refits: by set of keys, fitted to the fitted recordings alone.
+        rest: what the chosen set leaves at each block, Pa.
+    """
+
+    bench: Bench
+    exploration: Exploration
+    evidence: Evidence
+    judgement: Judgement
+    refits: dict[frozenset, Refit] = field(default_factory=dict)
+    whitenings: dict[frozenset, Whitening] = field(default_factory=dict)
+    plain: dict[frozenset, Refit] = field(default_factory=dict)
+
+    @property
+    def kind(self) -> str:
+        """The verdict as text."""
+        return self.judgement.kind.value
+
+    @property
+    def confidence(self) -> float:
+        """Its probability."""
+        return self.judgement.confidence
+
+    @property
+    def empty(self) -> Refit:
+        """The base model alone, least squares."""
+        return self.refits[frozenset()]
+
+    @property
+    def chosen(self) -> Refit:
+        """The fit that stands, or the best attempt."""
+        return self.refits[frozenset(self.judgement.chosen.keys)]
+
+    @property
+    def rivals(self) -> tuple[Refit, ...]:
+        """Sets that these data can't tell from the chosen one."""
+        if self.judgement.kind is not Kind.AMBIGUOUS:
+            return ()
+        return tuple(
+            self.refits[frozenset(s.keys)] for s, _ in covering(self.judgement) if frozenset(s.keys) in self.refits
+        )
+
+    @property
+    def misfit(self) -> Misfit:
+        """White noise as stated; what is correlated is the discrepancy's."""
+        return white(self.bench)
+
+    @property
+    def scored(self) -> dict[frozenset, list[Score]]:
+        """Linear scores at each set that was extended."""
+        return self.exploration.scored
+
+    def names(self, keys: frozenset) -> frozenset:
+        """Effects in a set, whatever their form."""
+        return self.exploration.names(keys)
+
+    @property
+    def explained(self) -> tuple[float, float]:
+        """Share of the base's misfit beyond noise that the chosen set removes, fitted and held out."""
+        before, after = self.empty, self.chosen
+        return (
+            _share(before.chi2 - before.n, after.chi2 - after.n),
+            _share(before.held - before.n_held, after.held - after.n_held),
+        )
+
+    def rest(self) -> dict:
+        """What the chosen model leaves beyond noise: `rms`, Pa, of the discrepancy's posterior mean; shares."""
+        s, e = self.judgement.chosen, self.exploration
+        w = e.weighed[frozenset(s.keys)]
+        peak, blocks = e.scales.peak, e.scales.cut.counts
+        squares = {}
+        for i, segment in enumerate(self.bench.segments):
+            rows = e.scales.blocked.rows[i]
+            squares[segment.recording] = squares.get(segment.recording, 0.0) + float(
+                np.sum(w.rest[rows] ** 2 * blocks[rows])
+            )
+        whole = sum(squares.values())
+        return {
+            "rms": float(np.sqrt(whole / np.sum(blocks))),
+            "unit": self.bench.segments[0].unit,
+            "share_of_peak": float(np.sqrt(whole / np.sum(blocks))) / peak,
+            "negligible": self.judgement.negligible,
+            "recordings": {n: x / whole if whole else 0.0 for n, x in squares.items()},
+            "parts": dict(s.amplitudes),
+            "kurtosis": s.kurtosis,
+        }
+
+
+def _share(before: float, after: float) -> float:
+    return float(np.clip(1 - max(after, 0.0) / before, -1.0, 1.0)) if before > 0 else 0.0
+
+
+def answer(
+    bench: Bench,
+    whole: Bench,
+    modes: Mapping[str, object],
+    effort: Effort | None = None,
+    report: Callable[[str], None] | None = None,
+    criteria: Criteria | None = None,
+) -> Answered:
+    """Weigh sets on all recordings, judge, and fit what is shown to the fitted recordings alone.
+
+    Args:
+        bench: with recordings held out; `whole`: the same sample with all of them fitted.
+        modes: kind of test by recording.
+    """
+    found = explore(whole, modes, criteria, effort, report)
+    evidence = found.evidence(bench.fitted, bench.held_out)
+    judgement = judge(evidence, criteria)
+    shown = copy.copy(bench)
+    shown.candidates = {k: replace(c, held=()) for k, c in bench.candidates.items()}
+    out = Answered(shown, found, evidence, judgement)
+    keys = [(), judgement.chosen.keys]
+    if judgement.kind is Kind.AMBIGUOUS:
+        keys += [s.keys for s, _ in covering(judgement)[:3]]
+    for k in dict.fromkeys(tuple(k) for k in keys):
+        shown_fit(out, k)
+    return out
+
+
+def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
+    """The fit of a set to the fitted recordings alone, and its misfit over the stated noise; remembered."""
+    weighed, scales, bench = out.exploration.weighed[frozenset(keys)], out.exploration.scales, out.bench
+    whitening = Whitening(bench, scales.cut, scales.blocked, weighed.parts, weighed.v)
+    misfit = whitening if keys else white(bench)
+    start = {p: v for p, v in weighed.refit.values.items() if p in bench.free}
+    fit = refit(bench, misfit, keys, start)
+    out.plain[frozenset(keys)], out.whitenings[frozenset(keys)] = fit, whitening
+    z = (bench.y - fit.prediction) / bench.sigma
+    inside, outside = bench.mask(bench.fitted), bench.mask(bench.held_out)
+    out.refits[frozenset(keys)] = replace(
+        fit,
+        chi2=squares(z[inside]),
+        n=int(np.sum(inside)),
+        held=squares(z[outside]),
+        n_held=int(np.sum(outside)),
+    )
+    return out.refits[frozenset(keys)]
+
+
+def squares(z: Float[np.ndarray, " n"]) -> float:
+    """Sum of squares; infinite where something is not finite."""
+    return float(z @ z) if np.all(np.isfinite(z)) else np.inf
+
+
+def evidence_file(folder: Path) -> Path:
+    """Where the evidence of a result lies."""
+    return folder / "evidence.json"

@@ -1,0 +1,128 @@
+"""The diagnosis of material tests as data: the tables of `result.json` from what was weighed."""
+
+import math
+from importlib.metadata import version
+
+from tissuejax.diagnosis.judgement.answer import Answered
+from tissuejax.diagnosis.judgement.evidence import SetEvidence
+from tissuejax.diagnosis.judgement.judge import Kind, covering
+from tissuejax.diagnosis.result import Diagnosis
+
+USED = (
+    "all recordings, those called held out too, chose the set of effects; every parameter shown, and every number for a "
+    "recording held out, comes from a fit to the other recordings, with nothing fitted to the one held out"
+)
+
+
+class MaterialDiagnosis(Diagnosis):
+    """A finished diagnosis of material tests; `search` and `verdict` are the same `Answered`."""
+
+    @property
+    def answered(self) -> Answered:
+        """All that was weighed, and the judgement."""
+        return self.search
+
+    def as_dict(self) -> dict:
+        """`result.json`."""
+        a, bench = self.answered, self.answered.bench
+        j = a.judgement
+        named = j.kind in (Kind.FOUND, Kind.IN_PART, Kind.AMBIGUOUS)
+        effects = self.effects(a.chosen)
+        stated = [e for e in effects if j.kind is Kind.AMBIGUOUS or e["name"] in j.names]
+        return {
+            "verdict": a.kind,
+            "confidence": a.confidence,
+            "probabilities": {k.value: p for k, p in j.probabilities.items()},
+            "inclusion": dict(j.inclusion),
+            "something_missing": j.missing,
+            "exactly_these": j.exact,
+            "reasons": [],
+            "effects": stated if named else [],
+            "best_attempt": [] if named else effects,
+            "alternatives": self.alternatives(),
+            "rest": a.rest(),
+            "next_experiment": [p.as_dict() for p in self.proposals],
+            "located": [x.as_dict() for x in self.located()],
+            "candidates": self.candidates(),
+            "sets": self.sets(1000),
+            "before": self.errors(a.empty),
+            "after": self.errors(a.chosen),
+            "held_out_uncertainty": [x.as_dict() for x in self.foreseen],
+            "base_parameters": self.base(),
+            "numerical_error": None,
+            "numerical_error_after": None,
+            "explained": {"fitted": a.explained[0], "held_out": a.explained[1] if bench.held_out else None},
+            "fitted": list(bench.fitted),
+            "held_out": list(bench.held_out),
+            "used": USED,
+            "sample": self.sample,
+            "energy": self.energy,
+            "warnings": list(bench.warnings),
+            "seconds": self.seconds,
+            "versions": {name: version(name) for name in ("tissuejax", "jax", "numpy", "scipy")},
+        }
+
+    def alternatives(self) -> list[dict]:
+        """Sets that these data can't tell from the chosen one, with their probability."""
+        a = self.answered
+        if a.judgement.kind is not Kind.AMBIGUOUS:
+            return []
+        return [
+            {"effects": list(s.names), "forms": list(s.keys), "probability": p, "log_evidence": s.log_evidence}
+            for s, p in covering(a.judgement)
+        ]
+
+    def candidates(self) -> list[dict]:
+        """Every effect tried: score at the base fit, weighed alone, probability that it is there."""
+        a = self.answered
+        first = {x.key: x for x in a.scored.get(frozenset(), [])}
+        base = self._of(())
+        out = []
+        for key, c in a.bench.candidates.items():
+            x, alone = first.get(key), self._of((key,))
+            if x is None and alone is None:
+                continue
+            out.append(
+                {
+                    "name": c.name,
+                    "form": c.form,
+                    "score": x.gain if x and math.isfinite(x.gain) else None,
+                    "score_share": x.share if x else None,
+                    "refit_chi2_per_sample": alone.chi2 / alone.n if alone else None,
+                    "criterion": 2 * (base.log_evidence - alone.log_evidence) if alone else None,
+                    "held_out_chi2_per_sample": None,
+                    "most_like": None,
+                    "correlation": None,
+                    "inclusion": a.judgement.inclusion.get(c.name, 0.0),
+                    "chosen": key in a.chosen.keys,
+                }
+            )
+        return sorted(out, key=lambda c: c["criterion"] if c["criterion"] is not None else math.inf)
+
+    def _of(self, keys: tuple[str, ...]) -> SetEvidence | None:
+        found = self.answered.exploration.weighed.get(frozenset(keys))
+        return found.evidence if found and math.isfinite(found.evidence.log_evidence) else None
+
+    def sets(self, most: int = 10) -> list[dict]:
+        """The best sets of effects, each in its best form, with their evidence and probability."""
+        a, best = self.answered, {}
+        for s in a.evidence.sets:
+            name = s.label or " + ".join(sorted(s.names))
+            if not s.void and math.isfinite(s.log_evidence):
+                best[name] = max(best.get(name, s), s, key=lambda x: x.log_evidence)
+        top = max(s.log_evidence for s in best.values())
+        rows = [
+            {
+                "effects": list(s.keys) or ([s.label] if s.label else []),
+                "probability": a.judgement.posterior.get("?" if s.label else name, 0.0),
+                "log_evidence_below_best": top - s.log_evidence,
+                "criterion": 2 * (top - s.log_evidence),
+                "information_criterion": s.chi2 + s.k * math.log(s.n) if math.isfinite(s.chi2) else None,
+                "chi2_per_sample": s.chi2 / s.n,
+                "held_out_chi2_per_sample": None,
+                "rest_share_of_peak": math.sqrt(s.rest[0]),
+                "explained": s.explained,
+            }
+            for name, s in best.items()
+        ]
+        return sorted(rows, key=lambda r: -r["probability"])[:most]

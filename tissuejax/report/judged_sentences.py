@@ -1,0 +1,112 @@
+"""A judged diagnosis in sentences: the verdict and what it rests on, in words that a physician can use."""
+
+import math
+
+from tissuejax.diagnosis.judgement.judge import Kind
+from tissuejax.diagnosis.judgement.material_diagnosis import USED, MaterialDiagnosis
+
+PARTS = {
+    "law": "smooth in stretch, shared by recordings (another law)",
+    "fine law": "bends in stretch, shared by recordings",
+    "gain": "a gain of each recording's own",
+    "hysteresis, step": "hysteresis that turns at once",
+    "hysteresis, narrow": "hysteresis that turns quickly",
+    "hysteresis, wide": "hysteresis that turns slowly",
+    "quick": "a quick wander in time",
+    "slow": "a slow wander in time",
+    "lasting": "a wander longer than a recording",
+    "white": "scatter from sample to sample beyond the stated noise",
+}
+
+
+def joined(names: list[str], word: str = "and") -> str:
+    """a, b and c."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {word} {names[-1]}"
+
+
+def chance(p: float) -> str:
+    """A probability in words that don't promise more than is known."""
+    if p > 0.995:
+        return "more than 99 in 100"
+    if p < 0.005:
+        return "fewer than 1 in 100"
+    return f"{100 * p:.0f} in 100"
+
+
+def size(d: MaterialDiagnosis) -> str:
+    """The rest in its unit and as a share of the peak."""
+    rest = d.answered.rest()
+    value, unit = rest["rms"], rest["unit"]
+    for big, word in ((1e6, "MPa"), (1e3, "kPa")):
+        if unit == "Pa" and value >= big:
+            value, unit = value / big, word
+            break
+    return f"{value:.3g} {unit} root mean square, {100 * rest['share_of_peak']:.2g} % of the largest stress"
+
+
+def lead(d: MaterialDiagnosis) -> str:
+    """The verdict in one or two sentences."""
+    a = d.answered
+    j = a.judgement
+    removed = f"explains {a.explained[0]:.0%} of what {d.energy} misses in the fitted recordings"
+    if a.bench.held_out:
+        removed += f" and {a.explained[1]:.0%} in the held-out ones"
+    if j.kind is Kind.NOTHING:
+        return (
+            f"Nothing is missing: {d.energy} predicts these recordings to within noise and what any law leaves "
+            f"({size(d)}). Of 100 such cases this should be right in {chance(a.confidence).removesuffix(' in 100')}."
+        )
+    if j.kind is Kind.FOUND:
+        return f"Missing: {joined(list(j.names))}, and nothing else of note. It {removed}; what is left is {size(d)}."
+    if j.kind is Kind.IN_PART:
+        more = [f"{n} ({100 * p:.0f} in 100)" for n, p in j.inclusion.items() if n not in j.names and p > 0.1]
+        also = f" Perhaps also {joined(more, 'or')}." if more else ""
+        return (
+            f"Missing: {joined(list(j.names))}. It {removed}. That is not all: {size(d)} is left that has no name."
+            f"{also}"
+        )
+    if j.kind is Kind.AMBIGUOUS:
+        others = [joined(list(x["effects"])) for x in d.alternatives()]
+        first = joined(list(dict.fromkeys(a.bench.candidates[k].name for k in a.chosen.keys)))
+        return (
+            "Something is missing that has a name, and these data can't say which: "
+            f"{joined([first, *others], 'or') if others else first}."
+        )
+    best = joined(list(dict.fromkeys(a.bench.candidates[k].name for k in a.chosen.keys))) if a.chosen.keys else ""
+    attempt = f" The best attempt, {best}, is less probable than that." if best else ""
+    return (
+        f"Something is missing that no effect of the catalogue explains: {size(d)} of the misfit has no better account "
+        f"than a smooth, nameless rest.{attempt}"
+    )
+
+
+def sure(d: MaterialDiagnosis) -> list[str]:
+    """How sure, in numbers."""
+    a, j, out = d.answered, d.answered.judgement, []
+    chances = ", ".join(f"{k.value} {chance(p)}" for k, p in sorted(j.probabilities.items(), key=lambda kv: -kv[1]))
+    out.append(f"Probabilities of the five answers: {chances}. The most probable is given.")
+    present = [f"{n} {chance(p)}" for n, p in j.inclusion.items() if p > 0.01][:6]
+    if present:
+        out.append(f"Probability that an effect is present, over all sets weighed: {', '.join(present)}.")
+    names = [(s.label or joined(list(s.names)), p) for s, p in j.alternatives if p > 1e-6][:1]
+    if names and j.kind in (Kind.FOUND, Kind.IN_PART):
+        out.append(f"Exactly these and no other: {chance(j.exact)}; the next best account is {names[0][0]}.")
+    r = a.empty
+    held = f", {math.sqrt(r.held / r.n_held):.3g} in the held-out ones" if a.bench.held_out else ""
+    out.append(f"{d.energy} alone misses by {math.sqrt(r.chi2 / r.n):.3g} times the stated noise{held}.")
+    if a.chosen.keys:
+        c = a.chosen
+        held = f", {math.sqrt(c.held / c.n_held):.3g} in the held-out ones" if a.bench.held_out else ""
+        out.append(f"With the effects by {math.sqrt(c.chi2 / c.n):.3g} times{held}.")
+    rest = a.rest()
+    large = [f"{PARTS[k]} {100 * v:.2g} %" for k, v in rest["parts"].items() if v > 1e-3]
+    if large:
+        out.append(f"What is left, by kind, as shares of the stress (typical amplitudes): {'; '.join(large)}.")
+    if rest["kurtosis"] > 5:
+        out.append(
+            f"What is left jumps (excess kurtosis {rest['kurtosis']:.0f}): slips, steps or spikes are none of the smooth "
+            "parts that were allowed for, and the names deserve doubt."
+        )
+    if a.bench.held_out:
+        out.append(f"Which data were used: {USED}.")
+    return out
