@@ -10,6 +10,7 @@ from tissuejax.challenge.make import KINDS, make
 from tissuejax.challenge.run import run
 from tissuejax.commands.arguments import positive
 from tissuejax.commands.command import Command, Reply
+from tissuejax.diagnosis.judgement.rejudge import rejudge
 from tissuejax.progress import for_terminal
 from tissuejax.report.challenge_table import figures
 
@@ -35,7 +36,7 @@ says what simpler ways of answering would have said on the same cases.
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
         """What to do, the challenge's folder, and the options of each."""
-        parser.add_argument("action", choices=("make", "run", "grade", "rivals"), help="what to do")
+        parser.add_argument("action", choices=("make", "run", "judge", "grade", "rivals"), help="what to do")
         parser.add_argument("folder", type=Path, metavar="FOLDER", help="the challenge")
         parser.add_argument(
             "--kind", choices=KINDS, default="material", help="make: material tests (default), probing, or rest"
@@ -77,6 +78,9 @@ says what simpler ways of answering would have said on the same cases.
             return Reply(
                 {"results": record}, f"{len(results)} cases answered; next: tissuejax challenge grade {given.folder}"
             )
+        if given.action == "judge":
+            said = rejudge(given.folder)
+            return Reply({"verdicts": said}, f"{len(said)} cases judged again from their evidence; next: grade")
         if given.action == "rivals":
             found = compare(given.folder, given.out, progress=for_terminal())
             return Reply(found, (given.out or given.folder).joinpath("rivals.csv").read_text())

@@ -20,17 +20,18 @@ from tissuejax.diagnosis.judgement.material_diagnosis import MaterialDiagnosis
 from tissuejax.diagnosis.material import MaterialBench, modes
 from tissuejax.diagnosis.next_experiment import proposals, settling
 from tissuejax.diagnosis.next_probing import probing_proposals
+from tissuejax.diagnosis.offered import HYSTERESIS, SCATTER, offered
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_map import stiffness_maps
 from tissuejax.diagnosis.probing_search import BUDGET as PROBING
 from tissuejax.diagnosis.probing_search import search_probing
 from tissuejax.diagnosis.result import Diagnosis
-from tissuejax.diagnosis.offered import offered
 from tissuejax.diagnosis.search import Budget, Search
 from tissuejax.diagnosis.sigma import sigmas
 from tissuejax.effects.catalogue import effects as all_effects
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.catalogue import energy as named_energy
+from tissuejax.energies.energy import Energy
 from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.catalogue import experiment
 from tissuejax.progress import Progress, Silent
@@ -75,8 +76,9 @@ def diagnose(
     fitted, held_out, remarks = split(sample, holdout)
     refuse_unusable(sample, fitted)
     for name in effects or ():
-        if name not in all_effects():
-            raise unknown("effect", name, all_effects())
+        known = (*all_effects(), SCATTER.name, HYSTERESIS.name)
+        if name not in known:
+            raise unknown("effect", name, known)
     remarks += slips(sample, (*fitted, *held_out))
     base = named_energy(energy, ogden_form)
     kind = experiment(sample.recordings[fitted[0]].experiment).kind
@@ -110,7 +112,9 @@ def diagnose(
         else:
             effort = Effort(most=budget.most, spend=budget.spend[-1]) if budget else Effort()
             found = answer(bench, whole, modes(whole), effort, told)
-    made = _probing(sample, energy, bench, found) if kind == "probing" else _material(sample, energy, base, bench, found)
+    made = (
+        _probing(sample, energy, bench, found) if kind == "probing" else _material(sample, energy, base, bench, found)
+    )
     made.seconds = time.perf_counter() - begun
     if out is not None:
         write_json(Path(out) / "result.json", made.as_dict())

@@ -5,10 +5,10 @@ import math
 
 from tissuejax.diagnosis.bench import Segment
 from tissuejax.diagnosis.misfit import Misfit
+from tissuejax.diagnosis.judgement.material_diagnosis import MaterialDiagnosis
 from tissuejax.diagnosis.quality import SIGNIFICANT
 from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.result import Diagnosis
-from tissuejax.diagnosis.judgement.material_diagnosis import MaterialDiagnosis
 from tissuejax.effects.catalogue import effects
 from tissuejax.report import judged_sentences
 from tissuejax.report.scales import with_std

@@ -104,8 +104,8 @@ def sure(d: MaterialDiagnosis) -> list[str]:
         out.append(f"What is left, by kind, as shares of the stress (typical amplitudes): {'; '.join(large)}.")
     if rest["kurtosis"] > 5:
         out.append(
-            f"What is left jumps (excess kurtosis {rest['kurtosis']:.0f}): slips, steps or spikes are none of the smooth "
-            "parts that were allowed for, and the names deserve doubt."
+            f"What is left jumps (excess kurtosis {rest['kurtosis']:.0f}): slips, steps or spikes are none of the "
+            "smooth parts that were allowed for, and the names deserve doubt."
         )
     if a.bench.held_out:
         out.append(f"Which data were used: {USED}.")

@@ -120,7 +120,7 @@ class Answered:
 
 
 def _share(before: float, after: float) -> float:
-    return float(np.clip(1 - max(after, 0.0) / before, -1.0, 1.0)) if before > 0 else 0.0
+    return float(np.clip(1 - max(after, 0.0) / before, 0.0, 1.0)) if before > 0 else 0.0
 
 
 def answer(

@@ -27,8 +27,8 @@ from tissuejax.errors import NotConverged
 from tissuejax.estimation.discrepancy import Series, discrepancy
 
 UNKNOWN = "unknown"
-HOPEFUL = 12.0  # nats below the best set up to which other forms and further effects of a set are tried
-GIVEN_UP = 30.0  # nats below the best set: a set is not followed to the end of its fit
+HOPEFUL = 8.0  # nats below the best set up to which other forms and further effects of a set are tried
+GIVEN_UP = 20.0  # nats below the best set: a set is not followed to the end of its fit
 LITTLE = -4.0  # nats: a nominee whose linear step promises less is not weighed
 
 
@@ -48,12 +48,12 @@ class Effort:
 
     most: int = 3
     singles: int = 10
-    pairs: int = 12
-    triples: int = 8
-    parents: tuple[int, int] = (3, 3)
-    reshaped: tuple[int, ...] = (3, 2, 1)
+    pairs: int = 10
+    triples: int = 6
+    parents: tuple[int, int] = (3, 2)
+    reshaped: tuple[int, ...] = (2, 1, 0)
     starts: int = 2
-    spend: float = 6e4
+    spend: float = 4e4
     burden: int = 2
 
 
@@ -196,7 +196,7 @@ class Exploration:
         g, step = gain(r, block, np.minimum(low, 0.0), np.maximum(high, 0.0))
         moved = np.sum(self.scales.cut.mean(raw) ** 2, axis=0)
         stress = float(np.sum(self.scales.reference**2))
-        size = self.criteria.change * np.sqrt(stress / np.maximum(moved, 1e-300))
+        size = np.where(moved > 0, self.criteria.change * np.sqrt(stress / np.where(moved > 0, moved, 1.0)), 0.0)
         h = (block * size).T @ (block * size)
         price = 0.5 * float(np.linalg.slogdet(np.eye(len(h)) + h)[1])
         worth = 0.5 * g - price - math.log(self.forms[c.name])
@@ -206,10 +206,12 @@ class Exploration:
         """Weigh sets with one effect more: the best nominees of every parent in turn."""
         lists = []
         for key in parents:
-            free = [c for c in self.bench.candidates.values() if c.widens and c.name not in self.names(key)]
+            free = [
+                c for c in self.bench.candidates.values() if c.name not in self.names(key) and self.strained(key, c)
+            ]
             seen = {c.name: [Score(c.key, math.inf, 0.0, {}, {}, np.zeros(0), ((0.0, {}, {}),))] for c in free}
             for s in self.score(key):
-                if s.gain < LITTLE:
+                if s.gain < (LITTLE if not key else 0.0):
                     break
                 seen.setdefault(self.bench.candidates[s.key].name, []).append(s)
             lists.append([(key, rows[0]) for rows in itertools.islice(seen.values(), each)])
@@ -222,6 +224,12 @@ class Exploration:
                 tried.add(company)
                 if self._grown(key, score) is not None:
                     most -= 1
+
+    def strained(self, key: frozenset, c) -> bool:
+        """Whether a part that the candidate widens is larger at a set's fit than it usually is."""
+        usual = self.scales.priors(self.criteria, {}) ** 2
+        v = self.weighed[key].v
+        return any(x > u for f, x, u in zip(self.scales.families, v, usual, strict=True) if f in c.widens)
 
     def _grown(self, key: frozenset, score: Score) -> Weighed | None:
         parent, candidate = self.weighed[key], self.bench.candidates[score.key]
@@ -239,11 +247,18 @@ class Exploration:
             for old in parent.evidence.keys:
                 for new in self.bench.candidates[old].beside:
                     order = tuple(new if k == old else k for k in parent.evidence.keys)
-                    if frozenset(order) in self.weighed or self.bench.burden(order) > self.effort.burden:
+                    known = frozenset(order) in self.weighed or self.bench.burden(order) > self.effort.burden
+                    if known or (len(order) > 1 and self.lost(new)):
                         continue
                     starts = [{**parent.refit.values, **s} for s in self.bench.candidates[new].grid]
-                    most = len(starts) if len(order) == 1 else self.effort.starts
-                    self.weigh(order, starts[: max(most, 1)][:4])
+                    most = self.effort.starts + 1 if len(order) == 1 else self.effort.starts
+                    self.weigh(order, starts[:most])
+
+    def lost(self, form: str) -> bool:
+        """Whether a form, weighed alone, was far behind another form of its effect."""
+        alone = {k: self.worth(k) for k in self.weighed if len(k) == 1 and self.same(k, frozenset({form}))}
+        own = alone.get(frozenset({form}))
+        return own is not None and own < max(alone.values()) - HOPEFUL
 
     def same(self, a: frozenset, b: frozenset) -> bool:
         """Whether two sets hold the same effects."""
@@ -301,7 +316,7 @@ def explore(
     for size, most in ((1, effort.pairs), (2, effort.triples)):
         parents = e.near(size)[: effort.parents[size - 1]]
         if size >= effort.most or not parents or (size == 2 and len(e.best) < 2):
-            break
+            break  # a third effect is sought where a second one has come in
         e.extend(parents, most, max(most // len(parents), 1) + 2)
         for key in e.near(size + 1)[: effort.reshaped[size]]:
             e.reshape(key)

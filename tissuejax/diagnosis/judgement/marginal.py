@@ -190,10 +190,13 @@ def amplitudes(
     for _ in range(most):
         g, f = m.slope * unit - 0.5, m.fisher * np.outer(unit, unit)
         size = 1 / np.sqrt(np.diag(f) + 1e-12)
-        c = np.linalg.cholesky(f * np.outer(size, size) + 1e-6 * np.eye(len(u)))
-        right = np.linalg.solve(c, size * g)
+        values, vectors = np.linalg.eigh(f * np.outer(size, size))
+        root = np.sqrt(np.maximum(values, 0.02))  # parts alike; blocks taken for diagonal
+        right = (vectors.T @ (size * g)) / root
         low = -u / size
-        step = size * lsq_linear(c.T, right, (low - 1e-12, np.full(len(u), np.inf)), method="bvls").x
+        step = (
+            size * lsq_linear(root[:, None] * vectors.T, right, (low - 1e-12, np.full(len(u), np.inf)), method="bvls").x
+        )
         step = np.maximum(step, -u)
         if float(g @ step) < tolerance:
             break

@@ -9,8 +9,8 @@ from tissuejax.diagnosis.judgement.judge import Kind, covering
 from tissuejax.diagnosis.result import Diagnosis
 
 USED = (
-    "all recordings, those called held out too, chose the set of effects; every parameter shown, and every number for a "
-    "recording held out, comes from a fit to the other recordings, with nothing fitted to the one held out"
+    "all recordings, those called held out too, chose the set of effects; every parameter shown, and every number for "
+    "a recording held out, comes from a fit to the other recordings, with nothing fitted to the one held out"
 )
 
 

@@ -1,0 +1,184 @@
+"""The judgement: evidence against dense linear algebra, and a verdict that is arithmetic on plain numbers."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.evidence import Evidence, SetEvidence, read_evidence, write_evidence
+from tissuejax.diagnosis.judgement.judge import Kind, judge
+from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, amplitude_mass, amplitudes, marginal
+from tissuejax.estimation.discrepancy import BAND, Part, Series, discrepancy, loading_states
+
+FORMS = {"relaxation": 2, "slack": 1, "drift": 3}
+
+
+def weighed(names, log_evidence, rest=1e-8, label="", void=False):
+    keys = tuple(names)
+    numbers = {"fit": 0.0, "parameters": 0.0, "discrepancy": 0.0, "amplitudes": {}, "k": 2, "at_bound": ()}
+    more = {"chi2": 100.0, "n": 100, "kurtosis": 0.0, "explained": 0.5, "rest": (rest, 1e-2 * rest)}
+    return SetEvidence(keys, keys, label, log_evidence, void=void, **numbers, **more)
+
+
+def evidence(*sets):
+    return Evidence(tuple(sets), FORMS, ("r1", "r2"), ("r3",))
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_no_other_verdict_has_a_larger_stated_probability(seed):
+    rng = np.random.default_rng(seed)
+    sets = [weighed(n, rng.normal(0, 4), 10 ** rng.uniform(-7, -2)) for n in ([], ["relaxation"], ["slack"], ["drift"])]
+    sets += [weighed(["relaxation", "slack"], rng.normal(0, 4)), weighed([], rng.normal(0, 4), label="unknown")]
+    j = judge(evidence(*sets))
+    assert j.confidence == max(j.probabilities.values())
+    assert sum(j.probabilities.values()) == pytest.approx(1.0)
+    assert all(0 <= p <= 1 for p in (*j.probabilities.values(), *j.inclusion.values()))
+
+
+def test_probabilities_by_hand():
+    """Two sets, no unknown: odds are prior odds times the ratio of evidences; slack has a third of 0.4, one form."""
+    criteria = Criteria(unknown=0.1)
+    j = judge(evidence(weighed([], 0.0), weighed(["slack"], math.log(12.0))), criteria)
+    odds = 12.0 * (0.4 / 3) / 0.4
+    assert j.inclusion["slack"] == pytest.approx(odds / (1 + odds))
+    assert j.kind is Kind.FOUND
+    assert j.names == ("slack",)
+
+
+def test_forms_share_the_prior_of_their_name():
+    one = judge(evidence(weighed([], 0.0), weighed(["drift"], 3.0)))
+    other = judge(evidence(weighed([], 0.0), weighed(["slack"], 3.0)))
+    odds = [j.inclusion[n] / (1 - j.inclusion[n]) for j, n in ((one, "drift"), (other, "slack"))]
+    assert odds[1] / odds[0] == pytest.approx(3.0)
+
+
+def test_a_rest_of_note_makes_found_in_part_and_never_withholds_the_name():
+    quiet = judge(evidence(weighed([], 0.0), weighed(["slack"], 30.0, rest=1e-8)))
+    loud = judge(evidence(weighed([], 0.0), weighed(["slack"], 30.0, rest=1e-3)))
+    assert (quiet.kind, loud.kind) == (Kind.FOUND, Kind.IN_PART)
+    assert quiet.names == loud.names == ("slack",)
+    assert quiet.inclusion == loud.inclusion
+
+
+def test_a_base_that_leaves_something_of_note_is_unexplained_and_one_that_does_not_lacks_nothing():
+    sets = [weighed(["slack"], -20.0)]
+    assert judge(evidence(weighed([], 0.0, rest=1e-8), *sets)).kind is Kind.NOTHING
+    assert judge(evidence(weighed([], 0.0, rest=1e-3), *sets)).kind is Kind.UNEXPLAINED
+    assert judge(evidence(weighed([], -90.0), weighed([], 0.0, label="unknown"), *sets)).kind is Kind.UNEXPLAINED
+
+
+def test_equal_evidence_of_several_names_is_ambiguous():
+    j = judge(
+        evidence(weighed([], -50.0), weighed(["slack"], 0.0), weighed(["relaxation"], 0.7), weighed(["drift"], 1.0))
+    )
+    assert j.kind is Kind.AMBIGUOUS
+    assert j.names == ()
+    assert j.missing == pytest.approx(1.0)
+
+
+def test_a_name_that_two_sets_share_is_found_though_neither_set_is_sure():
+    pair = weighed(["relaxation", "slack"], math.log((0.4 / 3) / (0.15 / 3)))
+    j = judge(evidence(weighed([], -50.0), weighed(["relaxation"], 0.0), pair))
+    assert j.inclusion["relaxation"] == pytest.approx(1.0)
+    assert j.inclusion["slack"] == pytest.approx(0.5, abs=1e-6)
+    assert j.kind in (Kind.FOUND, Kind.IN_PART)
+    assert "relaxation" in j.names
+
+
+def test_an_effect_that_rests_at_neutral_does_not_count():
+    j = judge(evidence(weighed([], 0.0), weighed(["slack"], 50.0, void=True)))
+    assert j.kind is Kind.NOTHING
+
+
+def test_evidence_comes_back_from_its_file_and_gives_the_same_verdict(tmp_path):
+    sets = evidence(weighed([], 0.0), weighed(["slack"], 2.0), weighed([], -1.0, label="unknown"))
+    again = read_evidence(write_evidence(sets, tmp_path / "evidence.json"))
+    assert again == sets
+    assert judge(again) == judge(sets)
+    shy = dataclasses.replace(Criteria(), sizes=(0.9, 0.1, 0.0, 0.0))
+    assert judge(again, shy).inclusion["slack"] < judge(again).inclusion["slack"]
+
+
+def made(seed=0, n=50):
+    """Two series that share a law, and a model of two parameters."""
+    rng = np.random.default_rng(seed)
+    series, stress = [], []
+    for name in ("a", "b"):
+        time = np.linspace(0, 20, n)
+        strain = np.interp(time, [0, 5, 10, 20], [0, 0.3, 0.1, 0.2])
+        series.append(Series(name, "pull", time, strain[:, None], loading_states(strain), 100.0))
+        stress.append(300 * strain)
+    stress, sigma = np.concatenate(stress), np.full(2 * n, 1.3)
+    residual = 1.3 * rng.standard_normal(2 * n) + 0.02 * stress * np.repeat([1, -1], n)
+    linear = Linear(residual, np.stack([stress, stress**2 / 50], 1), np.array([0.1, 0.2]), np.array([0.5, 3.0]))
+    return linear, discrepancy(series, sigma).about(stress), Blocked((slice(0, n), slice(n, 2 * n)), sigma)
+
+
+def dense(part: Part) -> np.ndarray:
+    if part.factor is not None:
+        return part.factor @ part.factor.T
+    n = len(part.within[0])
+    out = np.zeros((2 * n, 2 * n))
+    out[:n, :n], out[n:, n:] = part.within
+    return out
+
+
+def test_the_marginal_is_the_normal_density_with_parameters_integrated_out():
+    """With proper priors: y - f ~ N(J (mean - theta), D + sum v B + J weak^-1 J'), by scipy's density."""
+    linear, parts, blocked = made()
+    v = np.geomspace(1e-5, 1e-3, len(parts))
+    found = marginal(linear, parts, v, blocked)
+    covariance = np.diag(blocked.sigma**2) + sum(x * dense(p) for x, p in zip(v, parts, strict=True))
+    whole = covariance + linear.jacobian @ np.diag(1 / linear.weak) @ linear.jacobian.T
+    mean = -linear.jacobian @ linear.offset
+    expected = multivariate_normal(mean, whole).logpdf(linear.residual)
+    assert found.value + 0.5 * np.sum(np.log(linear.weak)) == pytest.approx(expected, abs=1e-6)
+
+
+def test_slopes_of_the_marginal_are_difference_quotients():
+    linear, parts, blocked = made()
+    v = np.full(len(parts), 1e-4)
+    slope = marginal(linear, parts, v, blocked).slope
+    for k in range(len(parts)):
+        up, down = (marginal(linear, parts, v + h * (np.arange(len(v)) == k), blocked).value for h in (1e-8, -1e-8))
+        assert slope[k] == pytest.approx((up - down) / 2e-8, rel=2e-3), parts[k].name
+
+
+def test_amplitudes_find_the_gain_that_was_put_in_and_rest_where_nothing_is():
+    linear, parts, blocked = made()
+    widths = np.full(len(parts), 0.02)
+    v, m = amplitudes(linear, parts, widths, blocked, widths**2)
+    share = dict(zip((p.name for p in parts), np.sqrt(v), strict=True))
+    assert share["gain"] == pytest.approx(0.02, rel=0.5)
+    assert share["law"] < 0.01
+    assert share["white"] < 0.006
+    assert np.isfinite(amplitude_mass(m, v, widths))
+
+
+def test_the_mass_over_one_amplitude_is_its_integral():
+    """One part alone: log of int p(y | a) p(a) da by quadrature over the amplitude, within a tenth of a nat or two."""
+    linear, parts, blocked = made(n=40)
+    part, width = parts[2:3], np.array([0.02])
+    v, _ = amplitudes(linear, part, width, blocked, width**2)
+    m = marginal(linear, part, v, blocked, fisher=True)
+    a = np.linspace(0, 0.15, 1200)
+    logs = np.array([marginal(linear, part, np.array([x**2]), blocked).value for x in a])
+    logs += 0.5 * math.log(2 / math.pi) - math.log(0.02) - 0.5 * (a / 0.02) ** 2
+    exact = math.log(np.trapezoid(np.exp(logs - m.value), a))
+    assert amplitude_mass(m, v, width) == pytest.approx(exact, abs=0.4)
+
+
+def test_the_loading_state_knows_the_way_and_not_the_rate():
+    way = np.concatenate([np.linspace(0, 1, 400), np.linspace(1, 0, 400), np.linspace(0, 0.5, 200)])
+    slow = np.repeat(way, 3)  # the same path with holds between
+    np.testing.assert_allclose(loading_states(slow)[2::3], loading_states(way), atol=1e-12)
+    h = loading_states(way)
+    assert h[399, 0] == pytest.approx(1.0, abs=1e-3)
+    assert h[799, 0] == pytest.approx(-1.0, abs=1e-3)
+    # after a path s in one direction the wide state is 1 - exp(-s / 0.3), less what the play takes at the start
+    assert h[199, 2] == pytest.approx(1 - math.exp(-(0.5 - 2 * BAND) / 0.3), abs=0.02)
+    trembling = 0.5 + 0.4 * BAND * np.sin(np.arange(300.0))
+    assert not loading_states(np.concatenate([[0.0, 1.0], trembling]))[2:, 0].max() > 0
