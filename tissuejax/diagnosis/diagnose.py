@@ -29,7 +29,6 @@ from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.diagnosis.search import Budget, Search
 from tissuejax.diagnosis.sigma import sigmas
 from tissuejax.effects.catalogue import effects as all_effects
-from tissuejax.energies.energy import Energy
 from tissuejax.energies.catalogue import energy as named_energy
 from tissuejax.energies.energy import Energy
 from tissuejax.errors import InputError, unknown

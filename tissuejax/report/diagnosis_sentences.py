@@ -4,8 +4,8 @@ import inspect
 import math
 
 from tissuejax.diagnosis.bench import Segment
-from tissuejax.diagnosis.misfit import Misfit
 from tissuejax.diagnosis.judgement.material_diagnosis import MaterialDiagnosis
+from tissuejax.diagnosis.misfit import Misfit
 from tissuejax.diagnosis.quality import SIGNIFICANT
 from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.result import Diagnosis
