@@ -27,10 +27,12 @@ class DiagnoseCommand(Command):
     teaches: ClassVar[str] = """
 Ask what a model lacks to predict the recordings of a sample.
 
-The base model is fitted; what it leaves is compared with the noise (serial correlation included); every effect of the
-catalogue, of tissue, rig and sensor, is scored and refitted, alone and together; the held-out recording takes
-no part in any fit. The verdict is one of: nothing-missing, found, ambiguous (one of these, and the experiment that
-would tell), or unexplained (something is missing that no effect of the catalogue explains).
+The base model is fitted; every effect of the catalogue, of tissue, rig and sensor, is tried, alone and together. Of
+material tests, sets of effects are compared by their evidence beside what any law leaves of real recordings; of
+probings by a criterion with the noise. The verdict is one of: nothing-missing; found; found-in-part (names, and a rest
+that is stated); ambiguous (one of these, and the experiment that would tell); or unexplained (something is missing that
+no effect of the catalogue accounts for). Nothing is fitted to a held-out recording of a material test: its errors are
+those of a prediction, though it has a say in which effects are chosen.
 
   tissuejax diagnose liver.h5 --energy reduced-polynomial-2 --out out/liver
   tissuejax diagnose muscle.toml --energy neo-hookean --holdout slow --holdout fast
