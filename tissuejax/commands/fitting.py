@@ -108,6 +108,9 @@ def reply(found: Fit, written: dict[str, Path]) -> Reply:
         f"  {row['path']:<34} {row['value']:>26} {row['unit']:<6}{row['note'] or row['interval']}"
         for row in sentences.table(found)
     ]
+    if found.shear_moduli:
+        at_once, left = found.shear_moduli.values()
+        lines += ["", f"  shear modulus: instantaneous {at_once:.4g} Pa, long-term {left:.4g} Pa"]
     lines.append("")
     lines += [f"  {e['key']:<40}{e['kind']:<10}RMSE {e['rmse']:<12}R2 {e['r2']}" for e in sentences.errors(found)[:40]]
     lines += ["", *(f"  ! {warning}" for warning in found.warnings)] if found.warnings else []

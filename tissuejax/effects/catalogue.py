@@ -2,7 +2,10 @@
 
 from tissuejax import effects as package
 from tissuejax.effects.effect import Effect
+from tissuejax.errors import InputError
 from tissuejax.families import lookup, members
+
+MOST_TERMS = 5
 
 
 def effects(kind: str | None = None) -> dict[str, type[Effect]]:
@@ -13,10 +16,18 @@ def effects(kind: str | None = None) -> dict[str, type[Effect]]:
 def effect(name: str, **options) -> Effect:
     """The effect called `name`, e.g. "softening"; `options` are its fields.
 
+    A number after the name is that of its terms: "viscoelasticity-3" has three relaxation times.
+
     Raises:
         InputError: no such effect; the nearest names are offered.
     """
-    return lookup("effect", name, effects())(**options)
+    found = effects()
+    stem, _, number = name.rpartition("-")
+    if name not in found and "terms" in getattr(found.get(stem), "__dataclass_fields__", ()) and number.isdigit():
+        if not 1 <= int(number) <= MOST_TERMS:
+            raise InputError(f"effect {name!r}: 1 to {MOST_TERMS} terms can be told apart at best")
+        name, options = stem, {"terms": int(number)} | options
+    return lookup("effect", name, found)(**options)
 
 
 def suited(name: str, kind: str, **options) -> Effect:

@@ -31,6 +31,7 @@ class NonlinearViscosity(Effect):
     source: ClassVar[str] = "Bergstrom and Boyce 1998, eq. 22"
     order: ClassVar[int] = 2
     amplitudes: ClassVar[tuple[str, ...]] = ("g",)
+    times: ClassVar[tuple[str, ...]] = ("tau",)
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"tau": (1.0, 10.0), "stress": (0.2,), "exponent": (3.0,)}
 
     @property

@@ -51,6 +51,16 @@ class Viscoelasticity(Effect):
         return tuple(f"g{i}" for i in self._numbers)
 
     @property
+    def shares(self) -> tuple[str, ...]:
+        """Parts of one whole: g1 + ... + gN stays below 1 in a fit, or nothing would be left in the long term."""
+        return self.amplitudes
+
+    @property
+    def times(self) -> tuple[str, ...]:
+        """Relaxation times, which no recording shows below its sampling nor far beyond its length."""
+        return tuple(f"tau{i}" for i in self._numbers)
+
+    @property
     def grid(self) -> dict[str, tuple[float, ...]]:
         """Two to three times in each term's part of the decades, so that terms keep their order."""
         edges = np.geomspace(self.shortest, self.longest, self.terms + 1)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tissuejax.fitting.memory import begun_loaded, times
 from tissuejax.fitting.stability import sentence
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ def warnings_of(found: "Fit") -> list[str]:
         said.append(f"{path} ended at its {side} bound ({limit:g} {unit}); its standard error means little there.")
     said += [text[0].upper() + text[1:] for text in found.uncertainty.sentences]
     said += [text] if (text := sentence(found.stability)) else []
+    if times(problem.predictor):
+        said += begun_loaded(problem.predictor.sample.recordings, problem.predictor.names, problem.noise)
     said += _misfit(found)
     said += _serial(found)
     said += _held_out(found)

@@ -34,7 +34,14 @@ def objective(problem: Problem) -> Callable[[Float[jax.Array, " p"]], Float[jax.
         x = jnp.where(box.only_lower, jnp.where(box.only_lower, box.lower, 0) + box.scale * jax.nn.softplus(y), x)
         x = jnp.where(box.only_upper, jnp.where(box.only_upper, box.upper, 0) - box.scale * jax.nn.softplus(-y), x)
         low = jnp.where(box.both, box.lower, 0)
-        return jnp.where(box.both, low + box.span * jax.nn.sigmoid(y), x)
+        x = jnp.where(box.both, low + box.span * jax.nn.sigmoid(y), x)
+        for group in box.sticks:
+            left = group.whole
+            for i in group.members:
+                fraction = x[i]
+                x = x.at[i].set(fraction * left)
+                left = left * (1 - fraction)
+        return x
 
     def loss(y):
         x = bounded(y)

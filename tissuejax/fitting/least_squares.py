@@ -8,6 +8,7 @@ lengths repeat.
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,7 +24,8 @@ from tissuejax.fitting.scores import scores
 from tissuejax.fitting.separable import NotSeparable, projected_descent, separable
 from tissuejax.fitting.serial import Serial, serial
 from tissuejax.fitting.stability import recorded_stability
-from tissuejax.fitting.starts import fitted_moduli, variations
+from tissuejax.fitting.starts import fitted_moduli, neutral, variations
+from tissuejax.fitting.transforms import chained
 from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
 
 METHODS = ("levenberg-marquardt", *GRADIENT_METHODS)
@@ -72,7 +74,7 @@ def descend(
             x, slope = box.bounded(y)
             r, jacobian = problem.linearised(problem.values(x))
             r, bend = soften(problem.loss, r)
-            return r, jacobian * slope * bend[:, None]
+            return r, chained(jacobian, slope) * bend[:, None]
 
         found = levenberg_marquardt(
             linearised, y, max_steps=max_steps, tolerance=tolerance, on_accept=heard, to_beat=to_beat
@@ -119,6 +121,12 @@ def fit(
     tries = [first, *variations(problem, first, multistart - 1, seed)]
     n, ends = 0, []
     options = {"method": method, "max_steps": max_steps, "on_accept": on_accept}
+    for held in neutral(problem) if start is None and multistart > 1 else ():
+        smaller = replace(problem, free=tuple(p for p in problem.free if p not in held))
+        inside = descend(smaller, first, method=method, max_steps=max_steps)
+        n += inside.n_evaluations
+        if np.isfinite(inside.cost):
+            tries.append(smaller.values(inside.y))
     for values in tries:
         ends.append(descend(problem, values, to_beat=min((e.cost for e in ends), default=np.inf), **options))
         n += ends[-1].n_evaluations

@@ -28,6 +28,7 @@ from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
 from tissuejax.fitting.sparing import sparing
 from tissuejax.fitting.stability import recorded_stability
+from tissuejax.fitting.transforms import chained, unchained
 from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
 from tissuejax.progress import Progress, Silent
 
@@ -105,7 +106,7 @@ def fit_probed(
         y = problem.box.free(problem.vector(start))
         kept.before = kept.before or vector_errors(problem, runs.begin(y))
         if kept.closing:  # the swift descent had ended already
-            J = runs.better(problem.box.bounded(y)[0]) * problem.box.bounded(y)[1]
+            J = chained(runs.better(problem.box.bounded(y)[0]), problem.box.bounded(y)[1])
             descent = Descent(y, 0.5 * float(runs.residuals(y) @ runs.residuals(y)), True, "converged", 0, [])
         else:
             descent, _, J = sparing(
@@ -118,7 +119,7 @@ def fit_probed(
                 on_accept=runs.accepted,
             )
         x, slope = problem.box.bounded(descent.y)
-        J = J / slope
+        J = unchained(J, slope)
         kept.keep(problem.values(x), closing=True)
         stage.advance(note="numerical error" if numerical else "the fine simulation")
         seen = changes(problem, problem.values(x), runs.told, finish, numerical)
@@ -193,7 +194,7 @@ class Runs:
         self.jacobians += 1
         x, slope = self.problem.box.bounded(y)
         r, J = self.swift.linearised(self.problem.values(x))
-        self.first[y.tobytes()] = r, J * slope
+        self.first[y.tobytes()] = r, chained(J, slope)
         return r
 
     def residuals(self, y: Float[np.ndarray, " p"]) -> Float[np.ndarray, " n"]:

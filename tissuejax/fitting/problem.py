@@ -5,7 +5,7 @@ by one row for every prior, (value - mean) / std. The Jacobian comes from the pr
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -16,7 +16,7 @@ from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.predictor import Predictor
 from tissuejax.fitting.losses import checked_loss
 from tissuejax.fitting.stability import penalty_rows
-from tissuejax.fitting.transforms import Box, checked_bounds
+from tissuejax.fitting.transforms import Box, Sticks, checked_bounds
 from tissuejax.fitting.weights import Noise
 from tissuejax.recordings.recording import Recording
 
@@ -90,7 +90,18 @@ class Problem:
         """The transform of the free parameters."""
         lower, upper = zip(*(self.bound(path) for path in self.free), strict=True)
         wide = [path in self.moduli for path in self.free]
-        return Box(list(lower), list(upper), [self.scale(path) for path in self.free], wide)
+        return Box(list(lower), list(upper), [self.scale(path) for path in self.free], wide, self.sticks(self.free))
+
+    def sticks(self, free: Sequence[str]) -> tuple[Sticks, ...]:
+        """Free parameters among `free` that are parts of one whole (`Effect.shares`), unless they have bounds."""
+        found = []
+        for effect in self.predictor.model.effects:
+            paths = [f"effects.{effect.name}.{name}" for name in getattr(effect, "shares", ())]
+            mine = tuple(free.index(path) for path in paths if path in free)
+            fixed = sum(float(self.start[path]) for path in paths if path not in self.free)
+            if mine and fixed < 1 and not any(path in self.bounds for path in paths):
+                found.append(Sticks(mine, 1.0 - fixed))
+        return tuple(found)
 
     @cached_property
     def moduli(self) -> tuple[str, ...]:

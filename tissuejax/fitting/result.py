@@ -16,6 +16,7 @@ from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.scores import Score
 from tissuejax.fitting.uncertainty import Uncertainty
 from tissuejax.model import Model
+from tissuejax.parameters import under
 from tissuejax.recordings.recording import Recording
 
 FORMAT = 1
@@ -101,6 +102,17 @@ class Fit:
         return found
 
     @property
+    def shear_moduli(self) -> dict[str, float]:
+        """Initial shear modulus at once and in the long term, Pa, of a model that relaxes; empty for others."""
+        model = self.problem.predictor.model
+        for effect in model.effects:
+            if hasattr(effect, "long_term"):
+                at_once = float(model.energy.initial_shear_modulus(under("energy", self.values)))
+                left = float(effect.long_term(under(f"effects.{effect.name}", self.values)))
+                return {"instantaneous": at_once, "long_term": at_once * left}
+        return {}
+
+    @property
     def covariance(self) -> np.ndarray:
         """(p, p), order of `free`."""
         return self.uncertainty.covariance
@@ -153,6 +165,7 @@ class Fit:
             },
             "correlation": {"paths": list(self.free), "matrix": self.correlation.tolist()},
             "condition_number": self.uncertainty.condition,
+            **({"shear_modulus": self.shear_moduli} if self.shear_moduli else {}),
             "interval": {"confidence": 0.95, "degrees_of_freedom": self.uncertainty.dof},
             "not_identified": list(self.uncertainty.sentences),
             "chi2": self.chi2,

@@ -16,7 +16,7 @@ from scipy.optimize import lsq_linear
 
 from tissuejax.fitting.levenberg_marquardt import HUGE, Descent, levenberg_marquardt
 from tissuejax.fitting.problem import Problem
-from tissuejax.fitting.transforms import Box
+from tissuejax.fitting.transforms import Box, chained
 
 LINEAR = 1e-6  # how far, as a share of its norm, the residual may differ from the linear forecast
 CUTOFF = 1e-12  # singular values below this share are not solved for
@@ -46,7 +46,7 @@ class Projection:
         rest = [path for path in problem.free if path not in problem.moduli]
         ends = [problem.bound(path) for path in rest]
         scale = [problem.scale(path) for path in rest]
-        self.box = Box([a for a, _ in ends], [b for _, b in ends], scale)
+        self.box = Box([a for a, _ in ends], [b for _, b in ends], scale, sticks=problem.sticks(rest))
         self.low = np.array([problem.bound(path)[0] for path in problem.moduli])
         self.high = np.array([problem.bound(path)[1] for path in problem.moduli])
         self.points: dict[bytes, np.ndarray] = {}
@@ -72,7 +72,7 @@ class Projection:
         if np.linalg.norm(r - forecast) > LINEAR * (np.linalg.norm(forecast) + 1e-3 * np.sqrt(len(r))):
             raise NotSeparable
         self.x, self.best = x, float(r @ r)
-        return r, self._projected(jacobian, x) * slope
+        return r, chained(self._projected(jacobian, x), slope)
 
     def solve(self, r, columns, now) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Moduli within bounds, the residual they give, and which are free of their bounds."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.predictor import Predictor
+from tissuejax.fitting.memory import spread, time_bounds
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.transforms import checked_bounds
 from tissuejax.fitting.weights import noise
@@ -66,7 +67,8 @@ def problem(
         free: what to estimate; by default all parameters that are neither fixed nor declared frozen.
         fix: values that stay as they are.
         start: where to begin; defaults are the declared ones, moved inside any bounds given here.
-        bounds: (lower, upper) by path.
+        bounds: (lower, upper) by path; relaxation times lie by default between the sampling step and three times the
+            longest recording.
         priors: (mean, standard deviation) by path.
         weights: "auto", "uniform", "relative" or standard deviations by channel.
         channels: only these channels, e.g. ("force",).
@@ -80,6 +82,7 @@ def problem(
     fix, start, bounds = dict(fix or {}), dict(start or {}), dict(bounds or {})
     checked(fix, declared)
     checked(start, declared)
+    seen = {p: b for p, b in time_bounds(predictor).items() if p not in {*fix, *start, *bounds}}
     for path in (*bounds, *(free or ()), *(priors or {})):
         if path not in declared:
             raise unknown("parameter", path, declared)
@@ -89,7 +92,8 @@ def problem(
     clash = sorted(set(free) & set(fix))
     if clash:
         raise InputError(f"{', '.join(clash)}: fixed and free at once; choose one")
-    values = predictor.model.defaults | start | fix
+    values = predictor.model.defaults | spread(seen) | start | fix
+    bounds = seen | bounds
     for path, (lower, upper) in bounds.items():
         lower, upper = checked_bounds(path, lower, upper)
         if path not in start and path not in fix:

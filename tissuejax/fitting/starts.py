@@ -42,6 +42,28 @@ def fitted_moduli(problem: Problem, values: Mapping[str, float]) -> dict[str, fl
     return trial if float(after @ after) < float(r @ r) else values
 
 
+def neutral(problem: Problem) -> list[tuple[str, ...]]:
+    """Sets of effects to leave at neutral in a first descent, so that no larger model ends worse than one inside it.
+
+    All of them, then each but one where there are several.
+    """
+    found = {}
+    for effect in problem.predictor.model.effects:
+        paths = tuple(p for p in problem.free if p.startswith(f"effects.{effect.name}."))
+        if paths and all(problem.start[f"effects.{effect.name}.{a}"] == 0 for a in _amplitudes(problem, effect)):
+            found[effect.name] = paths
+    every = tuple(p for paths in found.values() for p in paths)
+    if not every or len(every) == len(problem.free):
+        return []
+    singles = [tuple(p for p in every if p not in paths) for paths in found.values()] if len(found) > 1 else []
+    return [every, *singles]
+
+
+def _amplitudes(problem: Problem, effect) -> list[str]:
+    known = {path.removeprefix(f"effects.{effect.name}.") for path in problem.start}
+    return [a for a in effect.amplitudes if a in known]
+
+
 def variations(problem: Problem, first: Mapping[str, float], n: int, seed: int) -> Iterator[dict[str, float]]:
     """`n` starts around `first`: signs kept, magnitudes varied; parameters at zero drawn from their typical range."""
     rng = np.random.default_rng(seed)

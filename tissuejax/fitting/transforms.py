@@ -13,6 +13,8 @@ evaluations of the model, never inside one.
 """
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -41,11 +43,70 @@ def width(lower: float, upper: float, scale: float) -> float:
     return min(upper - lower, scale) if math.isfinite(upper - lower) else scale
 
 
-class Box:
-    """The transform of a vector of parameters with given bounds and scales."""
+WHOLE = 0.999  # most of a whole that its parts may take together
 
-    def __init__(self, lower: list[float], upper: list[float], scale: list[float], wide: list[bool] | None = None):
-        self.lower, self.upper = np.asarray(lower, float), np.asarray(upper, float)
+
+@dataclass(frozen=True)
+class Sticks:
+    """Parts of one whole, broken off it one after the other: x_i = whole f_i (1 - f_1) ... (1 - f_(i-1)).
+
+    Each fraction f_i lies between 0 and `WHOLE`, so the parts are never negative and never exceed the whole together.
+
+    Attributes:
+        members: places of the parts in the vector, in order.
+        whole: what there is to share.
+    """
+
+    members: tuple[int, ...]
+    whole: float = 1.0
+
+    def fractions(self, x: Float[np.ndarray, " p"]) -> Float[np.ndarray, " p"]:
+        """The vector with parts turned into fractions; parts that exceed the whole are scaled down to fit."""
+        out, parts = x.copy(), np.maximum(x[list(self.members)], 0.0)
+        parts = parts * min(1.0, 0.98 * self.whole / max(float(np.sum(parts)), 1e-300))
+        left = self.whole
+        for i, part in zip(self.members, parts, strict=True):
+            out[i] = min(part / left, WHOLE)
+            left *= 1 - out[i]
+        return out
+
+    def parts(self, f: Float[np.ndarray, " p"]) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, "p p"]]:
+        """The vector with fractions turned into parts, and its derivative."""
+        out, slope, left = f.copy(), np.eye(len(f)), self.whole
+        for k, i in enumerate(self.members):
+            out[i] = f[i] * left
+            slope[i, i] = left
+            for j in self.members[:k]:
+                slope[i, j] = -out[i] / (1 - f[j])
+            left *= 1 - f[i]
+        return out, slope
+
+
+def chained(jacobian: Float[np.ndarray, "n p"], slope: Float[np.ndarray, "..."]) -> Float[np.ndarray, "n p"]:
+    """Derivatives by x turned into derivatives by y, with the slope that `Box.bounded` gives."""
+    return jacobian * slope if slope.ndim == 1 else jacobian @ slope
+
+
+def unchained(jacobian: Float[np.ndarray, "n p"], slope: Float[np.ndarray, "..."]) -> Float[np.ndarray, "n p"]:
+    """The way back."""
+    return jacobian / slope if slope.ndim == 1 else np.linalg.solve(slope.T, jacobian.T).T
+
+
+class Box:
+    """The transform of a vector of parameters with given bounds and scales, some of them parts of a whole."""
+
+    def __init__(
+        self,
+        lower: list[float],
+        upper: list[float],
+        scale: list[float],
+        wide: list[bool] | None = None,
+        sticks: Sequence[Sticks] = (),
+    ):
+        self.sticks = tuple(sticks)
+        self.lower, self.upper = np.array(lower, float), np.array(upper, float)
+        for group in self.sticks:  # in the box stand fractions of what is left
+            self.upper[list(group.members)] = WHOLE
         self.scale = np.asarray(scale, float)
         low, high = np.isfinite(self.lower), np.isfinite(self.upper)
         self.both, self.only_lower, self.only_upper = low & high, low & ~high, high & ~low
@@ -61,7 +122,10 @@ class Box:
 
     def free(self, x: Float[np.ndarray, " p"]) -> Float[np.ndarray, " p"]:
         """y of an x strictly inside."""
-        x = self.inward(np.asarray(x, float))
+        x = np.asarray(x, float)
+        for group in self.sticks:
+            x = group.fractions(x)
+        x = self.inward(x)
         y = x / self.scale
         with np.errstate(all="ignore"):
             y = np.where(self.wide, np.arcsinh(x / self.small), y)
@@ -70,8 +134,8 @@ class Box:
             share = (x - self.lower) / self.span
             return np.where(self.both, np.log(share) - np.log1p(-share), y)
 
-    def bounded(self, y: Float[np.ndarray, " p"]) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
-        """x and dx/dy."""
+    def bounded(self, y: Float[np.ndarray, " p"]) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, "..."]]:
+        """x and dx/dy: (p,), or (p, p) where some are parts of a whole; see `chained`."""
         x, slope = self.scale * y, self.scale.copy()
         grow, fall = _sigmoid(y), _sigmoid(-y)
         with np.errstate(all="ignore"):
@@ -84,6 +148,9 @@ class Box:
             slope = np.where(self.only_lower, self.scale * grow, slope)
             slope = np.where(self.only_upper, self.scale * fall, slope)
             slope = np.where(self.both, self.span * grow * fall, slope)
+        for group in self.sticks:
+            x, broken = group.parts(x)
+            slope = broken * slope if slope.ndim == 1 else broken @ slope
         return x, slope
 
     def at_bound(self, x: Float[np.ndarray, " p"]) -> list[str | None]:

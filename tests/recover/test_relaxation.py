@@ -1,0 +1,148 @@
+"""Fits of relaxing specimens: number of terms, their sum, their times, where they start; data from own formulas."""
+
+import numpy as np
+import pytest
+
+import tissuejax as tj
+from tissuejax.effects.catalogue import effect
+from tissuejax.errors import InputError
+from tissuejax.experiments.predictor import predictor
+from tissuejax.fitting.setup import problem, split
+from tissuejax.fitting.starts import neutral
+from tissuejax.fitting.transforms import Box, Sticks, chained, unchained
+from tissuejax.recordings.recording import Channel, Recording, Sample
+
+MU, NOISE = 4000.0, 5.0
+STEP = 0.1
+
+
+def stress(stretch, terms, time):
+    """Neo-Hookean quasi-linear viscoelasticity, incompressible, uniaxial: P = l S_a - S_l / l^2.
+
+    Both components of the isochoric PK2 stress relax: increments fade with each tau, exactly for straight pieces.
+    """
+    trace = stretch**2 + 2 / stretch
+    axial, lateral = MU * (1 - trace / (3 * stretch**2)), MU * (1 - trace * stretch / 3)
+    out = []
+    for s in (axial, lateral):
+        left = s.copy()
+        for g, tau in terms:
+            h = np.zeros_like(s)
+            for k, dt in enumerate(np.diff(time)):
+                keep = np.exp(-dt / tau)
+                h[k + 1] = keep * h[k] + (1 - keep) * tau / dt * (s[k + 1] - s[k])
+            left -= g * (s - h)
+        out.append(left)
+    return stretch * out[0] - out[1] / stretch**2
+
+
+def pulled(terms, tops=(1.2, 0.85), seed=0, length=60.0, cut=0):
+    """Ramp in 2 s, hold, of one specimen in each direction named."""
+    rng, made = np.random.default_rng(seed), {}
+    time = np.arange(0, length, STEP)
+    for i, top in enumerate(tops):
+        stretch = np.interp(time, [0, 2, 0.7 * length, 0.75 * length], [1, top, top, 1])
+        y = stress(stretch, terms, time) + NOISE * rng.normal(size=len(time))
+        channel = Channel(time[cut:], y[cut:], "Pa", NOISE)
+        inputs = {"time": time[cut:], "stretch": stretch[cut:]}
+        made[f"r{i + 1}"] = Recording(f"r{i + 1}", "uniaxial", inputs, {"nominal_stress": channel}, {"start": 0.0})
+    return Sample("s", made)
+
+
+def test_one_term_is_found_on_tension_and_compression_together():
+    found = tj.fit(pulled([(0.35, 8.0)]), "neo-hookean", effects=["viscoelasticity-1"])
+    assert found.converged
+    assert not found.at_bound
+    assert found.chi2_per_dof == pytest.approx(1.0, abs=0.15)
+    truth = {"energy.mu": MU, "effects.viscoelasticity.g1": 0.35, "effects.viscoelasticity.tau1": 8.0}
+    for path, true in truth.items():
+        assert found.values[path] == pytest.approx(true, abs=4 * found.std[path] + 0.01 * true)
+        assert found.std[path] < 0.05 * true
+    assert set(found.free) == set(truth)
+    moduli = found.record()["shear_modulus"]
+    assert moduli["instantaneous"] == pytest.approx(MU, rel=0.03)
+    assert moduli["long_term"] == pytest.approx(0.65 * MU, rel=0.03)
+
+
+def test_the_sum_of_the_shares_stays_below_one_where_the_data_would_have_more():
+    """Stress that goes on falling, to below zero in the end: the best sum of a free fit is above 1."""
+    sample = pulled([(0.6, 2.0), (0.55, 20.0)], tops=(1.2,))
+    found = tj.fit(sample, "neo-hookean", effects=["viscoelasticity-2"], multistart=2)
+    total = sum(found.values[f"effects.viscoelasticity.g{i}"] for i in (1, 2))
+    assert 0.9 < total < 1.0
+    assert all(found.values[f"effects.viscoelasticity.g{i}"] >= 0 for i in (1, 2))
+
+
+def test_times_lie_between_the_sampling_and_three_lengths():
+    sample = pulled([(0.35, 8.0)])
+    fitted, _ = split(sample)
+    model = tj.material("neo-hookean", effects=["viscoelasticity-3"])
+    posed = problem(predictor(model, sample, fitted))
+    for i in (1, 2, 3):
+        path = f"effects.viscoelasticity.tau{i}"
+        assert posed.bound(path) == pytest.approx((STEP, 3 * 59.9))
+        assert STEP < posed.start[path] < 60
+    given = problem(predictor(model, sample, fitted), bounds={"effects.viscoelasticity.tau1": (1e-3, 1.0)})
+    assert given.bound("effects.viscoelasticity.tau1") == (1e-3, 1.0)
+    fixed = problem(predictor(model, sample, fitted), fix={"effects.viscoelasticity.tau1": 1e-3})
+    assert fixed.start["effects.viscoelasticity.tau1"] == 1e-3
+
+
+def test_a_fit_with_effects_starts_once_from_each_smaller_model():
+    sample = pulled([(0.35, 8.0)], length=30.0)
+    model = tj.material("neo-hookean", effects=["viscoelasticity-1", "slack"])
+    posed = problem(predictor(model, sample, ("r1", "r2")))
+    relax = {p for p in posed.free if ".viscoelasticity." in p}
+    slack = {p for p in posed.free if ".slack." in p}
+    assert [set(s) for s in neutral(posed)] == [relax | slack, slack, relax]
+    assert neutral(problem(predictor(tj.material("neo-hookean"), sample, ("r1", "r2")))) == []
+
+
+@pytest.mark.slow
+def test_a_larger_model_is_never_worse_than_the_one_inside_it():
+    sample = pulled([(0.35, 8.0)], length=30.0)
+    smaller = tj.fit(sample, "neo-hookean", effects=["viscoelasticity-1"])
+    larger = tj.fit(sample, "neo-hookean", effects=["viscoelasticity-1", "slack"])
+    assert larger.chi2 <= smaller.chi2 * (1 + 1e-6)
+
+
+def test_a_recording_cut_out_of_a_longer_one_is_told_so():
+    whole = tj.fit(pulled([(0.35, 8.0)], length=30.0), "neo-hookean", effects=["viscoelasticity-1"], multistart=1)
+    assert not any("begins under load" in w for w in whole.warnings)
+    rest = tj.fit(
+        pulled([(0.35, 8.0)], length=30.0, cut=230), "neo-hookean", effects=["viscoelasticity-1"], multistart=1
+    )
+    assert any("begins under load" in w for w in rest.warnings)
+    elastic = tj.fit(pulled([(0.35, 8.0)], length=30.0, cut=230), "neo-hookean", multistart=1)
+    assert not any("begins under load" in w for w in elastic.warnings)
+
+
+@pytest.mark.parametrize(
+    ("name", "terms"), [("viscoelasticity", 2), ("viscoelasticity-1", 1), ("viscoelasticity-5", 5)]
+)
+def test_the_number_of_terms_is_part_of_the_name(name, terms):
+    assert len(effect(name).amplitudes) == terms
+
+
+@pytest.mark.parametrize("name", ["viscoelasticity-0", "viscoelasticity-6", "slack-2", "viscoelastic-2"])
+def test_other_numbers_are_refused(name):
+    with pytest.raises(InputError):
+        effect(name)
+
+
+def test_parts_of_a_whole_against_differences(rng):
+    box = Box([0, 0, 0, -5], [1, 1, 1, 5], [0.1, 0.1, 0.1, 1], sticks=[Sticks((0, 2, 1), 0.8)])
+    x = np.array([0.3, 0.1, 0.25, 2.0])
+    y = box.free(x)
+    back, slope = box.bounded(y)
+    np.testing.assert_allclose(back, x, atol=1e-12)
+    numeric = np.stack([(box.bounded(y + h)[0] - box.bounded(y - h)[0]) / 2e-6 for h in 1e-6 * np.eye(4)], axis=1)
+    np.testing.assert_allclose(slope, numeric, atol=1e-8)
+    jacobian = rng.normal(size=(7, 4))
+    np.testing.assert_allclose(unchained(chained(jacobian, slope), slope), jacobian, atol=1e-10)
+    for far in 50 * rng.normal(size=(20, 4)):
+        parts = box.bounded(far)[0]
+        assert np.all(parts[:3] >= 0)
+        assert parts[:3].sum() < 0.8
+    crowded = box.bounded(box.free(np.array([0.6, 0.6, 0.6, 0.0])))[0]
+    assert crowded[:3].sum() < 0.8
