@@ -53,9 +53,23 @@ what is wrong with a file.
         if given.out:
             from tissuejax.report.page import write_figures  # it brings every plot along; the text comes without
 
-            written = write_figures(sample, given.out)
+            written = dict(write_figures(sample, given.out))
+            if (cut := _cut(given.file, sample.name)) is not None:
+                written |= write_figures(cut, given.out)
         record["files"] = {name: str(path) for name, path in written.items()}
         return Reply(record, "\n".join([*text_of(record), *(f"figure {p}" for p in written.values())]))
+
+
+def _cut(file: str, name: str):
+    """What a side file's selection kept of a sample's tests; None where it cuts nothing."""
+    from tissuejax.recordings.table import selections
+    from tissuejax.report.kept_rows import Selections
+
+    side = Path(file.partition("#")[0] if not Path(file).exists() else file)
+    side = side if side.suffix.lower() == ".toml" else side.with_suffix(".toml")
+    if not side.is_file() or file.lower().endswith((".h5", ".hdf5")):
+        return None
+    return Selections(selections(side, name)) or None
 
 
 def described(sample: Sample) -> dict:

@@ -102,15 +102,10 @@ def turns(motion: Float[np.ndarray, " n"], hysteresis: float = HYSTERESIS) -> In
         elif sense * (motion[extreme] - value) >= least:
             found.append(extreme)
             sense, extreme = -sense, i
-    # What comes after the last peak or valley is a half cycle only if it is a motion of its own.
-    if extreme != found[-1]:
-        found.append(extreme)
-    if found[-1] != len(motion) - 1:
-        if len(found) % 2 == 1:  # it ended at rest and rests on
-            found[-1] = len(motion) - 1
-        else:
-            found.append(len(motion) - 1)
-    return np.array(found)
+    # What comes after the last peak or valley goes back by less than a turn: a hold, or rest.
+    return np.array(
+        [*found, len(motion) - 1] if extreme != found[-1] or len(found) == 1 else [*found[:-1], len(motion) - 1]
+    )
 
 
 def chosen(

@@ -1,9 +1,11 @@
 """The rows of one test turned into a Recording: units, signs, zeroing, filter, then stretch and nominal stress."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Bool, Float
 
 from tissuejax.errors import InputError
 from tissuejax.recordings import checks, rig
@@ -94,6 +96,49 @@ class Kept(NamedTuple):
     values: dict[str, np.ndarray]
     sizes: Sizes
     notes: list[str]
+
+
+@dataclass(frozen=True)
+class Considered:
+    """All rows of one test and which of them a selection keeps, in SI, for a picture.
+
+    Attributes:
+        name: of the recording.
+        time: s, or the row's number where no time was recorded.
+        motion, load: the measured columns, the first axis of two.
+        motion_name, load_name, motion_unit, load_unit: what they are.
+        kept: whether the row is in the recording.
+        notes: what was done.
+    """
+
+    name: str
+    time: Float[np.ndarray, " n"]
+    motion: Float[np.ndarray, " n"]
+    load: Float[np.ndarray, " n"]
+    motion_name: str
+    load_name: str
+    motion_unit: str
+    load_unit: str
+    kept: Bool[np.ndarray, " n"]
+    notes: tuple[str, ...]
+
+
+def considered(part: Part, columns: Columns, rows: np.ndarray, sizes: Sizes, name: str, place: str) -> Considered:
+    """What `recording_from` chooses from, and what it keeps.
+
+    Raises:
+        InputError: as `recording_from`.
+    """
+    values, rows = _numbers(part, columns, rows, place)
+    time = values.pop("time", np.arange(len(rows), dtype=float))
+    motion = next(q for q in values if q in KINEMATIC)
+    load = next(q for q in values if q in STRESS)
+    chosen_rows = selected(part, values, motion, load, sizes, place)
+    kept = np.zeros(len(rows), bool)
+    kept[chosen_rows.rows[:: part.every]] = True
+    first = {q: values[q].reshape(len(rows), -1)[:, 0] for q in (motion, load)}
+    units = QUANTITIES[motion], QUANTITIES[load]
+    return Considered(name, time, first[motion], first[load], motion, load, *units, kept, tuple(chosen_rows.notes))
 
 
 def selected(part: Part, values: Mapping[str, np.ndarray], kinematic: str, load: str, sizes: Sizes, place: str) -> Kept:

@@ -45,7 +45,7 @@ from tissuejax.recordings.format import Format
 from tissuejax.recordings.places import resolve
 from tissuejax.recordings.recording import Sample
 from tissuejax.recordings.side_file import Column, Part, SideFile, parse
-from tissuejax.recordings.specimens import recording_from
+from tissuejax.recordings.specimens import Considered, considered, recording_from
 from tissuejax.units import factor
 
 
@@ -89,6 +89,22 @@ def read_table(side: str | os.PathLike) -> dict[str, Sample]:
     """
     table = Table()
     return {name: table.read(Path(side), name) for name in table.names(Path(side))}
+
+
+def selections(side: str | os.PathLike, name: str) -> list[Considered]:
+    """Which rows of a sample's tests are kept, for the recordings whose part cuts them (cycles, preload, ...).
+
+    Raises:
+        InputError: as reading does.
+    """
+    parsed = _side(Path(side))
+    found = []
+    for key, group in _groups(parsed)[name].items():
+        if group.part.selection:
+            place = f"{group.columns.path}: sample {name!r}, recording {key!r}"
+            sizes = {k: _size(parsed, group, k, v, place) for k, v in group.part.specimen.items()}
+            found.append(considered(group.part, group.columns, group.rows, sizes, key, place))
+    return found
 
 
 def _side(path: Path) -> SideFile:
