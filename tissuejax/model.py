@@ -1,10 +1,12 @@
 """A Model: a strain energy plus the effects that are switched on."""
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import equinox as eqx
 from jaxtyping import Array
 
+from tissuejax.cohesion.law import Law
 from tissuejax.effects.effect import Effect
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.volumetric import Volumetric
@@ -13,7 +15,7 @@ from tissuejax.parameters import Parameter, prefixed, under
 
 
 class Model(eqx.Module):
-    """Strain energy, volumetric energy (None = incompressible) and effects.
+    """Strain energy, volumetric energy (None = incompressible), effects, and for cuts the law by which tissue parts.
 
     Dotted paths: `energy.mu`, `volumetric.K`, `effects.friction.coefficient`. A parameter that every recording has
     for itself ends in the recording, `effects.drift.offset.r1`, once the model knows the recordings.
@@ -23,6 +25,7 @@ class Model(eqx.Module):
     volumetric: Volumetric | None = None
     effects: tuple[Effect, ...] = ()
     recordings: tuple[str, ...] = ()
+    cohesion: Law | None = None
 
     def __check_init__(self):
         names = [effect.name for effect in self.effects]
@@ -35,6 +38,8 @@ class Model(eqx.Module):
         declared = prefixed("energy", self.energy.parameters)
         if self.volumetric is not None:
             declared |= prefixed("volumetric", self.volumetric.parameters)
+        if self.cohesion is not None:
+            declared |= prefixed("cohesion", self.cohesion.parameters)
         for effect in self.effects:
             declared |= prefixed(f"effects.{effect.name}", effect.parameters)
         return declared
@@ -76,15 +81,15 @@ class Model(eqx.Module):
             if any(values[f"effects.{effect.name}.{a}"] != 0 for a in effect.amplitudes)
             or any(path.startswith(f"effects.{effect.name}.") for path in wanted)
         )
-        return Model(self.energy, self.volumetric, kept, self.recordings)
+        return replace(self, effects=kept)
 
     def with_effects(self, *effects: Effect) -> "Model":
         """The same base with further effects."""
-        return Model(self.energy, self.volumetric, (*self.effects, *effects), self.recordings)
+        return replace(self, effects=(*self.effects, *effects))
 
     def across(self, recordings: Sequence[str]) -> "Model":
         """The same model for these recordings, or for one nameless recording if there are none."""
-        return Model(self.energy, self.volumetric, self.effects, tuple(recordings))
+        return replace(self, recordings=tuple(recordings))
 
     def effect_values(self, values: Mapping[str, Array], effect: Effect) -> dict[str, Array]:
         """The values that belong to `effect`, by their own names."""

@@ -1,33 +1,17 @@
 """Plane slabs that several tests cut."""
 
+import jax.numpy as jnp
 import numpy as np
 
 from tissuejax.cohesion.catalogue import law
 from tissuejax.energies.neo_hookean import NeoHookean
 from tissuejax.energies.volumetric import Quadratic
-from tissuejax.mesh.columns import box
-from tissuejax.mesh.split import Split, split
-from tissuejax.recordings.recording import Geometry
+from tissuejax.mesh.slab import across, block, plane_slice, slice_held
+from tissuejax.mesh.split import split
 from tissuejax.tled import build, seam
 from tissuejax.tled.blade import Wedge
 
 MU, BULK = 1564.0, 2600.0
-
-
-def slab(length: float, half: float, h: float) -> Split:
-    """One layer of hexes of size h from x = 0, split along y = 0; every node is fixed (in z; `grip` frees the rest)."""
-    g = box((length, 2 * half, h), (round(length / h), round(2 * half / h), 1))
-    points = g.points + np.array([length / 2, 0, 0])
-    whole = Geometry(points, g.cells, g.cell_type, np.arange(len(points)))
-    return split(whole, lambda p: p[:, 1])
-
-
-def grip(points, half: float) -> np.ndarray:
-    """Held axes: z everywhere (plane strain), all at the sides."""
-    held = np.zeros_like(points)
-    held[:, 2] = 1
-    held[np.isclose(np.abs(points[:, 1]), half)] = 1
-    return held
 
 
 def cut(
@@ -35,15 +19,75 @@ def cut(
     thickness=2e-3, rounding=2e-4, speed=0.05, name="bilinear", damping=20.0, **joint,
 ):  # fmt: skip
     """A wedge of 30 degrees driven into a slab from its edge."""
-    made = slab(length, half, h)
+    made = plane_slice(length, half, h)
     end = travel / speed
     times = (np.arange(frames) + 0.5) * end / frames
     scene = build.scene(
         made.geometry, NeoHookean(), Quadratic(), {"mu": MU}, {"K": bulk}, 1000.0, times,
-        held=grip(made.geometry.points, half), joined=seam.pairs(made), mass_damping=damping,
+        held=slice_held(made.geometry.points, half), joined=seam.pairs(made), mass_damping=damping,
         hourglass=seam.HOURGLASS,
     )  # fmt: skip
     scene = seam.joined(scene, made, law(name), {"strength": strength, "energy": energy}, **joint)
     wedge = Wedge(thickness, np.tan(np.radians(15)), rounding)
     tip = np.array([[-2e-3, 0, 0], [-2e-3 + travel, 0, 0]])
     return seam.armed(scene, made, wedge, np.array([0, end]), tip, friction=friction)
+
+
+def _apart(made, held, path, seconds, frames, values, bulk, **joint):
+    """A split body whose held nodes move apart: minus side down, plus side up, by path(t)."""
+    points = np.asarray(made.geometry.points)
+    times = (np.arange(frames) + 0.5) * seconds / frames
+    scene = build.scene(
+        made.geometry, NeoHookean(), Quadratic(), {"mu": values.pop("mu", MU)}, {"K": bulk}, 1000.0, times, held=held,
+        joined=seam.pairs(made), mass_damping=values.pop("damping", 20.0), hourglass=values.pop("hourglass", 0.3),
+    )  # fmt: skip
+    scene = seam.joined(scene, made, law("bilinear"), values, **joint)
+    at = np.linspace(0, seconds, 401)
+    motion = np.zeros((401, 3))
+    motion[:, 1] = path(at)
+    sign = np.zeros_like(points)
+    sign[:, 1] = np.where(np.isin(np.arange(len(points)), np.unique(made.geometry.cells[_upper(made)])), 1.0, -1.0)
+    sign = sign * np.asarray(held)
+    return scene.put(
+        {
+            "support.time": jnp.asarray(at),
+            "support.displacement": jnp.asarray(motion),
+            "support.pattern": jnp.asarray(sign[np.asarray(made.geometry.fixed)]),
+        }
+    )
+
+
+def _upper(made):
+    return np.asarray(made.geometry.points)[np.asarray(made.geometry.cells)].mean(1)[:, 1] > 0
+
+
+def pulled(
+    h, bulk, ends, energy, length=0.02, half=0.005, notch=0.0, seconds=1.0, frames=60, strength=4000.0, narrow=False
+):
+    """A slab, notched or not, whose sides are drawn apart by `ends` each, evenly and slowly."""
+    made = plane_slice(length, half, h)
+    held = slice_held(made.geometry.points, half)
+    held[:, 0] = np.maximum(held[:, 0], float(narrow))  # no stretch along the slab either
+    middle = np.asarray(made.geometry.points)[made.minus].mean(1)[:, 0]
+    values = {"strength": strength, "energy": energy, "damping": 60.0}
+    return _apart(
+        made, held, lambda t: ends * t / seconds, seconds, frames, values, bulk,
+        notch=(middle < notch).astype(float) if notch else None,
+    )  # fmt: skip
+
+
+def cantilever(n: int, seconds: float = 3.0):
+    """Double cantilever: arms 5 mm high, 60 mm long, 10 mm wide, crack of 20 mm, E 50 kPa, nu 0; and its opening(t)."""
+    h = 5e-3 / n
+    made = split(block(np.arange(round(0.06 / h) + 1) * h, across(5e-3, h), np.array([0, 0.01])), lambda p: p[:, 1])
+    points = np.asarray(made.geometry.points)
+    held = np.zeros_like(points)
+    held[:, 2] = 1
+    end = np.isclose(points[:, 0], 0) & np.isclose(np.abs(points[:, 1]), 2.5e-3)
+    held[end, :2] = 1
+    middle = points[made.minus].mean(1)[:, 0]
+    values = {"strength": 500.0, "energy": 0.02, "mu": 25e3, "damping": 40.0, "hourglass": 0.3}
+    scene = _apart(
+        made, held, lambda t: 1.65e-3 * t / seconds, seconds, 150, values, 5e4 / 3, notch=(middle < 0.02).astype(float)
+    )
+    return scene, lambda t: 2 * 1.65e-3 * t / seconds

@@ -12,6 +12,7 @@ from typing import ClassVar
 import equinox as eqx
 from jaxtyping import Array, Float
 
+from tissuejax.effects.cutting_test import Cut
 from tissuejax.effects.material_test import MaterialTest, Stress
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.energies.strain import Strain
@@ -27,7 +28,7 @@ class Effect(eqx.Module):
 
     Class data:
         name: as on the command line.
-        kinds: which experiments it can act in, of {"homogeneous", "probing"}.
+        kinds: which experiments it can act in, of {"homogeneous", "probing", "cutting"}.
         reveals: what in a recording shows it.
         blind: experiments (or protocols) that can't show it.
         amplitudes: parameters that are 0 at neutral; the others ("shapes") vanish with the effect.
@@ -42,7 +43,7 @@ class Effect(eqx.Module):
         stress), `memory` (isochoric stress with history), `exerted` (nominal stress of the specimen as a whole, inside
         the rig), `stress` (rig and sensor: what the cell reports). Probing:
         `scene` (the physical set-up: probe path, support, stiffness field, contact law, memory...), `channels`
-        (sensors).
+        (sensors). Cutting: `cut` (what the blade meets along its path), and `scene` and `channels` as in a probing.
     """
 
     name: ClassVar[str]
@@ -112,3 +113,7 @@ class Effect(eqx.Module):
     ) -> Mapping[str, Channel]:
         """Probing channels ("force", "markers") as the sensors report them, from the true series on a fine clock."""
         return channels
+
+    def cut(self, p: Mapping[str, Array], cut: Cut) -> Cut:
+        """What a blade meets along its path with this effect in it."""
+        return cut

@@ -1,0 +1,42 @@
+"""Is the cutting simulation right? Closed forms, meshes, balances, derivatives, cost, and the source's own run.
+
+tissuejax study fits/cutting          about half an hour on a free core; parts that are in result.json are kept
+
+Each part is a function that gives plain numbers; delete its key from result.json to run it again.
+"""
+
+import json
+import runpy
+import time
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from tissuejax.storage import write_json
+
+jax.config.update("jax_enable_x64", True)
+
+HERE = Path(__file__).parent
+PARTS = ("bonded", "steady", "strength", "nearly", "strip", "beam", "derivatives", "cost", "scaling", "source")
+
+
+def main(folder: Path) -> str:
+    """Run the parts that are missing; write result.json and the figures; the answer in a sentence."""
+    path = folder / "result.json"
+    found = json.loads(path.read_text()) if path.exists() else {}
+    cases = runpy.run_path(str(folder / "cases.py"))
+    for part in PARTS:
+        if part in found or part not in cases:
+            continue
+        begun, cpu = time.perf_counter(), time.process_time()
+        found[part] = cases[part]()
+        found[part]["seconds"] = {"wall": time.perf_counter() - begun, "cpu": time.process_time() - cpu}
+        write_json(path, found)
+    runpy.run_path(str(folder / "page.py"))["write"](folder, found)
+    worst = max(abs(r["error_percent"]) for r in found["steady"]["runs"])
+    return f"steady blade force within {worst:.2f} % of the closed form; see {folder / 'report.html'}"
+
+
+__all__ = ["HERE", "jnp", "main", "np"]

@@ -1,0 +1,89 @@
+"""Cutting: a blade drawn through tissue. What its force must be, from the balance of energies.
+
+In the steady state the blade's work goes into parting (toughness G), into the two layers that it leaves squeezed behind
+it, and into friction on its flats. Per depth of cut,
+
+    F = G + 2 W psi(1 - b / 2W) + 2 mu p L,
+
+psi the strain energy of a layer of height W (half the tissue's width) pressed together by half the thickness b, p
+its pressure, L the length of blade in contact (all that is cut, or `reach`). On the way back, and in a cut made before,
+only friction is left. This is exact for any law of parting and any strain (virtual work), and holds no strength: that
+is in the entry, which only the simulation has (`cutting_run.py`); here the force sets in over a length.
+Atkins 2009, The Science and Engineering of Cutting, ch. 3; Lister 2012, 3.1.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from tissuejax.effects.cutting_test import Cut
+from tissuejax.energies.strain import Strain
+from tissuejax.errors import InputError
+from tissuejax.experiments.cutting_record import Path
+from tissuejax.experiments.experiment import Experiment
+from tissuejax.model import Model
+from tissuejax.parameters import under
+from tissuejax.recordings.recording import Recording
+from tissuejax.tensors import Sym
+
+ONSET = 2e-3  # m: length over which the force sets in, where nothing says otherwise
+
+
+class Cutting(Experiment):
+    """A blade drawn through a sample: force on the blade, and markers beside the path."""
+
+    name: ClassVar[str] = "cutting"
+    kind: ClassVar[str] = "cutting"
+
+    def predict(self, model: Model, values: Mapping[str, Array], recording: Recording) -> Recording:
+        """A cut can't be predicted from its recording alone.
+
+        Raises:
+            InputError: always; the body is needed.
+        """
+        raise InputError(f"recording {recording.name}: a cut needs the body; use predictor(model, sample)")
+
+
+def layer(model: Model, values: Mapping[str, Array], half: float, thickness) -> tuple[Array, Array]:
+    """Energy of the two squeezed layers per area of cut, J/m^2, and the pressure on a flat, Pa."""
+    energy, bulk = under("energy", values), under("volumetric", values)
+
+    def psi(stretch):
+        one, none = jnp.ones_like(stretch), jnp.zeros_like(stretch)
+        strain = Strain.of(Sym(one, stretch**2, one, none, none, none))
+        total = model.energy.isochoric(energy, strain)
+        return total if model.volumetric is None else total + model.volumetric.energy(bulk, strain.J)
+
+    stretch = 1 - 0.5 * jnp.asarray(thickness) / half
+    value, slope = jax.value_and_grad(psi)(stretch)
+    return 2 * half * value, -slope
+
+
+def met(model: Model, values: Mapping[str, Array], path: Path, at, pace, elapsed, depth) -> Cut:
+    """What the blade meets at stations along a path, all effects included."""
+    one = jnp.ones_like(jnp.asarray(at, float))
+    cut = Cut(
+        at=jnp.asarray(at, float), share=jnp.clip(jnp.asarray(at) / path.length, 0, 1),
+        pace=jnp.asarray(pace),
+        elapsed=jnp.asarray(elapsed), energy=values["cohesion.energy"] * one,
+        strength=values["cohesion.strength"] * one,
+        depth=jnp.asarray(depth), friction=jnp.asarray(0.0), onset=jnp.asarray(ONSET),
+    )  # fmt: skip
+    for effect in model.ordered:
+        cut = effect.cut(under(f"effects.{effect.name}", values), cut)
+    return cut
+
+
+def balance_force(model: Model, values: Mapping[str, Array], path: Path) -> Float[Array, " n"]:
+    """Force against the motion at the times of the path, N, by the balance of energies."""
+    begun = float(path.time[int((path.x > 0).argmax())])
+    cut = met(model, values, path, path.front, path.speed, path.time - begun, path.depth)
+    wedge, pressure = layer(model, values, path.half, path.thickness)
+    sets_in = 1 - jnp.exp(-jnp.maximum(cut.at - path.notch, 0.0) / cut.onset)
+    parting = path.fresh * (cut.energy + wedge) * sets_in
+    contact = jnp.clip(jnp.asarray(path.x), 0, path.length)
+    way = jnp.tanh(jnp.asarray(path.speed) / 1e-4)  # at rest the springs of friction hold what they held
+    return cut.depth * (parting + 2 * cut.friction * pressure * contact * way)

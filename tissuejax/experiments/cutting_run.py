@@ -1,0 +1,157 @@
+"""A cut simulated: a plane slice of the tissue with cohesive faces on the path, whose force per depth counts.
+
+The slice holds what the energy balance has not: the law of parting, so strength and entry. The cut is run at
+`SPEED`, whatever its own pace was (inertia is small at both; a rate effect acts through the toughness), by running time
+faster. Depth multiplies the slice's force; a blade that does not cut all the way through shears the tissue below it,
+which a slice leaves out (`tled` has the whole, see docs/cutting.md).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from tissuejax.cohesion.law import Law
+from tissuejax.effects.effect import Effect
+from tissuejax.errors import InputError
+from tissuejax.experiments.cutting import met
+from tissuejax.experiments.cutting_record import Path
+from tissuejax.experiments.probing import Added
+from tissuejax.mesh.slab import plane_slice, slice_held
+from tissuejax.model import Model
+from tissuejax.parameters import under
+from tissuejax.tled import build, seam
+from tissuejax.tled.blade import Wedge
+from tissuejax.tled.scene import Scene
+from tissuejax.tled.simulate import simulate
+
+SPEED = 0.05  # m/s
+FEWEST = 8
+
+
+@dataclass(frozen=True)
+class CuttingSettings:
+    """Numerical choices of a simulated cut.
+
+    Attributes:
+        h: size of the elements along the path, m; None: the half thickness of the blade, and at least `FEWEST` along
+            it.
+        growth: of elements away from the path, from one to the next.
+        reach: of the path that is simulated, m; the whole by default.
+        rounding: of the blade's shoulder, in its thickness. damping: mass damping, 1/s.
+        strongest: strength that the faces' stiffness must allow, over the start's.
+    """
+
+    h: float | None = None
+    growth: float = 1.25
+    reach: float | None = None
+    rounding: float = 0.2
+    damping: float = 20.0
+    strongest: float = 3.0
+
+    def finer(self, path: Path, factor: float = 2.0) -> "CuttingSettings":
+        """Smaller elements."""
+        return replace(self, h=element_size(self, path) / factor)
+
+
+class Slice(NamedTuple):
+    """A scene made ready for many values, and the stations of its faces."""
+
+    scene: Scene
+    at: Float[np.ndarray, " P"]
+    pace: Float[np.ndarray, " P"]
+    elapsed: Float[np.ndarray, " P"]
+    width: float
+    pathtime: Float[np.ndarray, " n"]
+    runtime: Float[np.ndarray, " n"]
+
+
+class Ran(eqx.Module):
+    """A simulated cut: force per depth and depth at the path's times, failure code, worst error of the balance."""
+
+    force: Float[Array, " n"]
+    failed: Array
+    element: Array
+    imbalance: Array
+    parted: Array
+
+
+def element_size(settings: CuttingSettings, path: Path) -> float:
+    """Size of the elements along the path, m."""
+    return settings.h or min(0.5 * path.thickness, path.length / FEWEST)
+
+
+def prepare(model: Model, values: Mapping[str, float], density: float, path: Path, settings: CuttingSettings) -> Slice:
+    """The slice that `run_slice` simulates.
+
+    Raises:
+        InputError: no cohesive law in the model; see `tled.seam` for blade and faces.
+    """
+    law: Law | None = model.cohesion
+    if law is None:
+        raise InputError("the model has no cohesive law: name one, e.g. --law bilinear")
+    h = element_size(settings, path)
+    far = float(min(path.x.max(), settings.reach or np.inf))
+    used = path.x <= far + 1e-12
+    last = len(used) if used.all() else int(np.argmin(used))
+    x = path.x[:last]
+    length = min(path.length, far + 4 * path.thickness)
+    made = plane_slice(round(length / h) * h, path.half, h, settings.growth)
+    # the run's clock: same places in the same order, at SPEED; rests pass in no time
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(x)))])
+    keep = np.concatenate([[True], np.diff(way) > 1e-9])
+    runtime, end = way / SPEED, way[-1] / SPEED
+    frames = max(20, int(np.ceil(way[-1] / (0.5 * h))))
+    times = (np.arange(frames) + 0.5) * end / frames
+    scene = build.scene(
+        made.geometry, model.energy, model.volumetric, under("energy", values), under("volumetric", values), density,
+        times, held=slice_held(np.asarray(made.geometry.points), path.half), joined=seam.pairs(made),
+        mass_damping=settings.damping, hourglass=seam.HOURGLASS,
+    )  # fmt: skip
+    middle = np.asarray(made.geometry.points)[made.minus].mean(1)[:, 0]
+    cohesive = under("cohesion", values)
+    strong = cohesive | {"strength": cohesive["strength"] * settings.strongest}
+    faces = len(middle)
+    scene = seam.joined(scene, made, law, strong, notch=(middle < path.notch).astype(float))
+    blade = Wedge(path.thickness, np.tan(path.angle / 2), settings.rounding * path.thickness)
+    tip = np.stack([x[keep], np.zeros(keep.sum()), np.zeros(keep.sum())], 1)
+    scene = seam.armed(scene, made, blade, runtime[keep], tip, friction=0.0)
+    spread = {k: jnp.full(faces, float(v)) for k, v in cohesive.items()}
+    scene = scene.put({"faces.values": spread})
+    passing = np.maximum.accumulate(path.x)
+    first = np.searchsorted(passing, middle).clip(0, len(path.x) - 1)
+    begun = path.time[int((path.x > 0).argmax())]
+    clock = np.interp(path.time, path.time[:last], runtime)
+    return Slice(scene, middle, path.speed[first], path.time[first] - begun, h, path.time, clock)
+
+
+def run_slice(model: Model, values: Mapping[str, Array], ready: Slice, path: Path) -> Ran:
+    """Force against the motion at the path's times, N. Pure JAX."""
+    scene = ready.scene
+    depth = jnp.interp(jnp.asarray(ready.at), jnp.asarray(path.front), jnp.asarray(path.depth))
+    cut = met(model, values, path, ready.at, ready.pace, ready.elapsed, depth)
+    fields = {**scene.faces.values, "energy": cut.energy, "strength": cut.strength}
+    changes = {
+        "tissue.energy_values": {k: jnp.asarray(v, float) for k, v in under("energy", values).items()},
+        "tissue.volumetric_values": {k: jnp.asarray(v, float) for k, v in under("volumetric", values).items()},
+        "faces.values": fields,
+        "probe.friction": cut.friction,
+    }
+    scene = scene.put(changes)
+    for effect in model.ordered:
+        p = under(f"effects.{effect.name}", values)
+        if type(effect).energy is not Effect.energy:
+            scene = scene.put({"tissue.added": (*scene.tissue.added, Added(effect, p))})
+        scene = effect.scene(p, None, scene)
+    out = simulate(scene)
+    at = jnp.interp(jnp.asarray(ready.runtime), out.time, -out.force[:, 0] / ready.width)
+    deep = met(model, values, path, path.front, path.speed, path.time - path.time[0], path.depth).depth
+    work = jnp.abs(out.balance.work)
+    late = work > 0.05 * work[-1]
+    poison = jnp.where(out.failed >= 0, jnp.nan, 0.0)
+    worst = jnp.max(jnp.where(late, jnp.abs(out.balance.error), 0.0))
+    return Ran(at * deep + poison, out.failed, out.element, worst, out.balance.area[-1] / ready.width)
