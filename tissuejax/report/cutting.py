@@ -46,11 +46,10 @@ def _rows(found: CutFit) -> list[dict]:
     declared, rows = found.predictor.model.parameters, []
     for path, std in found.std.items():
         low, high = found.interval[path]
-        note = (
-            f"not identified: {found.unidentified[path]}" if path in found.unidentified else f"{low:.4g} to {high:.4g}"
-        )
-        rows.append({"path": path, "value": f"{found.values[path]:.4g}", "std": f"{std:.2g}", "unit": declared[path].unit,
-                     "note": note})  # fmt: skip
+        why = found.unidentified.get(path)
+        note = f"not identified: {why}" if why else f"{low:.4g} to {high:.4g}"
+        row = {"path": path, "value": f"{found.values[path]:.4g}", "std": f"{std:.2g}", "unit": declared[path].unit}
+        rows.append(row | {"note": note})
     return rows
 
 
