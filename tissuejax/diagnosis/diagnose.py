@@ -10,6 +10,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tissuejax.cache.programs import keep_programs
+from tissuejax.diagnosis.cutting import CuttingBench, strokes_to_settle
 from tissuejax.diagnosis.decide import decide
 from tissuejax.diagnosis.foreseen import OPEN, foreseen
 from tissuejax.diagnosis.judgement.answer import Answered, answer, evidence_file
@@ -17,6 +18,7 @@ from tissuejax.diagnosis.judgement.evidence import write_evidence
 from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.judgement.judge import Kind
 from tissuejax.diagnosis.judgement.material_diagnosis import MaterialDiagnosis
+from tissuejax.diagnosis.kept_refits import KeptRefits
 from tissuejax.diagnosis.material import MaterialBench, modes
 from tissuejax.diagnosis.next_experiment import proposals, settling
 from tissuejax.diagnosis.next_probing import probing_proposals
@@ -26,7 +28,7 @@ from tissuejax.diagnosis.probing_map import stiffness_maps
 from tissuejax.diagnosis.probing_search import BUDGET as PROBING
 from tissuejax.diagnosis.probing_search import search_probing
 from tissuejax.diagnosis.result import Diagnosis
-from tissuejax.diagnosis.search import Budget, Search
+from tissuejax.diagnosis.search import Budget, Search, search
 from tissuejax.diagnosis.sigma import sigmas
 from tissuejax.effects.catalogue import effects as all_effects
 from tissuejax.energies.catalogue import energy as named_energy
@@ -84,6 +86,8 @@ def diagnose(
     keep = keep or (None if out is None else Path(out) / "runs")
     if kind == "probing":
         bench, budget = ProbingBench.of(sample, base, fitted, held_out, effects, keep), budget or PROBING
+    elif kind == "cutting":
+        bench = CuttingBench.of(sample, base, fitted, held_out, effects)
     else:
         sigma, more = sigmas(sample, (*fitted, *held_out))
         bench = MaterialBench.of(sample, base, fitted, held_out, sigma, effects)
@@ -108,17 +112,20 @@ def diagnose(
 
         if kind == "probing":
             found = search_probing(bench, budget, told)
+        elif kind == "cutting":
+            found = search(bench, budget or Budget(), told, KeptRefits(bench, None))
         else:
             effort = Effort(most=budget.most, spend=budget.spend[-1]) if budget else Effort()
             found = answer(bench, whole, modes(whole), effort, told)
-    made = (
-        _probing(sample, energy, bench, found) if kind == "probing" else _material(sample, energy, base, bench, found)
-    )
+    if kind == "homogeneous":
+        made = _material(sample, energy, base, bench, found)
+    else:
+        made = (_probing if kind == "probing" else _cutting)(sample, energy, bench, found)
     made.seconds = time.perf_counter() - begun
     if out is not None:
         write_json(Path(out) / "result.json", made.as_dict())
         write_json(Path(out) / "remainder.json", made.remainders())
-        if kind != "probing":
+        if kind == "homogeneous":
             write_evidence(found.evidence, evidence_file(Path(out)))
     return made
 
@@ -132,6 +139,12 @@ def _probing(sample: Sample, energy: str, bench: ProbingBench, found: Search) ->
         maps = stiffness_maps(bench, found.empty.values, found.empty.prediction)
     bench.runs.forget()
     return Diagnosis(sample.name, energy, found, verdict, 0.0, ideas, maps)
+
+
+def _cutting(sample: Sample, energy: str, bench: CuttingBench, found: Search) -> Diagnosis:
+    verdict = decide(found)
+    bench.warnings += strokes_to_settle(sample, bench, verdict)
+    return Diagnosis(sample.name, energy, found, verdict, 0.0)
 
 
 def _material(sample: Sample, energy: str, base: Energy, bench: MaterialBench, found: Answered) -> MaterialDiagnosis:

@@ -26,7 +26,7 @@ class Drift(Effect):
     """
 
     name: ClassVar[str] = "drift"
-    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing", "cutting"})
     reveals: ClassVar[str] = "stress at rest, growing in time"
     blind: ClassVar[str] = "recordings without samples at rest; a wrong gain is never seen"
     source: ClassVar[str] = "linear sensor model"
@@ -39,7 +39,7 @@ class Drift(Effect):
         """Offset and rate; of each axis of the force in a probing."""
         return (
             ("offset", "rate")
-            if self.kind == "homogeneous"
+            if self.kind != "probing"
             else tuple(f"{a}_{c}" for a in ("offset", "rate") for c in "xyz")
         )
 
@@ -52,6 +52,11 @@ class Drift(Effect):
                 Parameter(f"{name}_{c}", unit, 0.0, scale=scale, each=each, meaning=f"{meaning} along {c}")
                 for name, (unit, scale, meaning) in sizes.items()
                 for c in "xyz"
+            )
+        if self.kind == "cutting":
+            return (
+                Parameter("offset", "N", 0.0, scale=3e-3, each=each, meaning="zero error of the force"),
+                Parameter("rate", "N/s", 0.0, scale=3e-4, each=each, meaning="drift of the force"),
             )
         return (
             Parameter("offset", "Pa", 0.0, scale=10.0, each=each, meaning="zero error of the load cell"),
@@ -68,6 +73,10 @@ class Drift(Effect):
     def channels(
         self, p: Mapping[str, Array], test: ProbingTest, channels: Mapping[str, Channel]
     ) -> Mapping[str, Channel]:
+        if self.kind == "cutting":
+            seen = channels["cutting_force"]
+            force = seen.values + p["offset"] + p["rate"] * (seen.time - seen.time[0])
+            return {**channels, "cutting_force": Channel(seen.time, force, seen.unit, seen.noise_std)}
         if self.kind != "probing":
             return channels
         seen = channels["force"]
