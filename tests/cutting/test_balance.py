@@ -41,8 +41,8 @@ def test_steady_cut_return_and_second_pass():
     back = first + np.argmax(X[first:] >= 0.0249) + 50
     again = len(X) - 100
     assert at[first] == pytest.approx(0.01 * (5.0 + wedge + rub * X[first]), rel=1e-3)
-    assert at[back] == pytest.approx(-0.01 * rub * X[back], rel=1e-3)
-    assert at[again] == pytest.approx(0.01 * rub * X[again], rel=1e-3)
+    assert at[back] == pytest.approx(0.01 * (wedge - rub * X[back]), rel=1e-3)
+    assert at[again] == pytest.approx(0.01 * (wedge + rub * X[again]), rel=1e-3)
     assert at[0] == 0
 
 

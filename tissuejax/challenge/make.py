@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from tissuejax.challenge import files, material_cases, rest_cases
+from tissuejax.challenge import cutting_cases, files, material_cases, rest_cases
 from tissuejax.errors import InputError, unknown
 from tissuejax.progress import Progress, Silent
 from tissuejax.storage import replacing, write_json
 
-KINDS = ("material", "probing", "rest")
+KINDS = ("material", "probing", "rest", "cutting")
 
 
 def make(
@@ -38,7 +38,8 @@ def make(
 
     Args:
         out: folder of the challenge.
-        kind: "material", "probing", or "rest": material tests of known effects beside a rest that no catalogue has.
+        kind: "material", "probing", "cutting" or "rest": material tests of known effects beside a rest that no
+            catalogue has.
         count: number of cases.
         seed: the same seed gives the same cases; another one, others.
         jobs: processes.
@@ -80,6 +81,7 @@ def make(
         "material": partial(_material, out, seed),
         "rest": partial(_rest, out, seed),
         "probing": partial(_probing, out, seed, which),
+        "cutting": partial(_cutting, out, seed),
     }[kind]
     entries, keys = {}, {}
     with (progress or Silent()).stage(f"making {count} {kind} cases", total=count) as stage:
@@ -132,6 +134,13 @@ def _rest(out: Path, seed: int, index: int) -> tuple[str, str, dict]:
     with replacing(out / "sealed" / "kept" / f"{name}.npy") as temporary, open(temporary, "wb") as file:
         np.save(file, stress)
     return name, case.energy, case.key
+
+
+def _cutting(out: Path, seed: int, index: int) -> tuple[str, str, dict]:
+    name = f"c{index:03d}"
+    case = cutting_cases.draw(name, seed, index)
+    cutting_cases.write(case, out / "cases" / f"{name}.h5")
+    return name, "neo-hookean", case.key
 
 
 def _probing(out: Path, seed: int, which: dict[str, bool], index: int) -> tuple[str, str, dict]:

@@ -1,10 +1,11 @@
 """The bench of cuts: the force against the motion by the balance of energies, with every effect of cutting in it.
 
 A prediction takes microseconds, so the search of material tests serves cuts as it is. The balance has no law of
-parting: at the entry it lets the force set in over a length, which belongs to the base model with the toughness. The
-tissue's own modulus is held at the energy's default scaled to the size of the force: wedging and toughness have one sum in a first
-pass, so what is named "friction" here is a force that grows with the length cut, and its coefficient is that of the
-assumed modulus (`tissuejax cut fit` with the measured modulus gives the number).
+parting: at the entry it lets the force set in over a length, which belongs to the base model with the toughness.
+
+The tissue's own modulus is held at the energy's default, scaled to the size of the force. Wedging and toughness have
+one sum in a first pass, so "blade-friction" means a force that grows with the length cut; its coefficient is that of
+the assumed modulus (`tissuejax cut fit` with the measured modulus gives the number).
 """
 
 from collections.abc import Mapping, Sequence
@@ -78,8 +79,7 @@ class CuttingBench(Bench):
         bench = cls(segments, y, np.concatenate(sigmas), fitted, held_out, BASE, free, start, candidates)
         bench._p, bench._order, bench._programs = p, list(declared), {}
         bench.warnings.append(
-            "the tissue's modulus is not in a cut: wedging counts as toughness, and a friction coefficient is relative to "
-            f"an assumed modulus ({start[next(q for q in start if q.startswith('energy.'))]:.3g} Pa)"
+            "the tissue's modulus is not in a cut: a friction coefficient is relative to an assumed one"
         )
         return bench
 

@@ -82,8 +82,9 @@ def balance_force(model: Model, values: Mapping[str, Array], path: Path) -> Floa
     begun = float(path.time[int((path.x > 0).argmax())])
     cut = met(model, values, path, path.front, path.speed, path.time - begun, path.depth)
     wedge, pressure = layer(model, values, path.half, path.thickness)
-    sets_in = 1 - jnp.exp(-jnp.maximum(cut.at - path.notch, 0.0) / cut.onset)
-    parting = path.fresh * (cut.energy + wedge) * sets_in
+    fresh = 1 - jnp.exp(-jnp.maximum(cut.at - path.notch, 0.0) / cut.onset)
+    inside = 1 - jnp.exp(-jnp.maximum(jnp.asarray(path.x), 0.0) / cut.onset)
+    parting = path.fresh * cut.energy * fresh + wedge * inside
     contact = jnp.clip(jnp.asarray(path.x), 0, path.length)
     way = jnp.tanh(jnp.asarray(path.speed) / 1e-4)  # at rest the springs of friction hold what they held
     return cut.depth * (parting + 2 * cut.friction * pressure * contact * way)

@@ -40,6 +40,7 @@ class CuttingPredictor(Predictor):
     settings: CuttingSettings = eqx.field(static=True)
     paths_of: Mapping[str, Path]
     slices: Mapping[str, Slice]
+    lenient: bool = eqx.field(static=True, default=False)
 
     @classmethod
     def prepare(
@@ -50,12 +51,14 @@ class CuttingPredictor(Predictor):
         by: str = "balance",
         settings: CuttingSettings | None = None,
         start: Mapping[str, float] | None = None,
+        lenient: bool = False,
     ) -> "CuttingPredictor":
         """See `predictor`.
 
         Args:
             by: "balance" or "simulation". settings: of a simulation.
             start: values for which a simulation's step and stiffness are chosen (declared ones by default).
+            lenient: a run that breaks down is a prediction of NaN (for a descent that tries values) and no error.
 
         Raises:
             InputError: no cohesive law or volumetric energy, an unknown way, a recording that can't be cut.
@@ -73,7 +76,7 @@ class CuttingPredictor(Predictor):
                 slices[n] = prepare(
                     model.across(()), local(model, at, n), sample.density or DENSITY, paths[n], settings
                 )
-        return cls(model, sample, names, by, settings, paths, slices)
+        return cls(model, sample, names, by, settings, paths, slices, lenient)
 
     def of(self, names: Sequence[str]) -> "CuttingPredictor":
         """The same model for other recordings of the sample."""
@@ -146,7 +149,7 @@ class CuttingPredictor(Predictor):
         return Recording(name, r.experiment, r.inputs, {FORCE: made}, r.attributes)
 
     def _refuse_failed(self, name: str, ran: Ran | None) -> None:
-        if ran is None or isinstance(ran.failed, jax.core.Tracer) or int(ran.failed) < 0:
+        if self.lenient or ran is None or isinstance(ran.failed, jax.core.Tracer) or int(ran.failed) < 0:
             return
         scene = self.slices[name].scene
         x, y, _ = 1e3 * np.asarray(scene.body.points)[np.asarray(scene.body.cells)[int(ran.element)]].mean(0)

@@ -131,7 +131,7 @@ def fit_cut(
     values = first.values
     if by == "balance":
         return first
-    values = values | {k: v for k, v in dict(start or {}).items() if k != ENERGY}
+    values = values | dict(start or {})
     if STRENGTH not in (start or {}) and STRENGTH not in known:  # a face that parts at half the blade's thickness
         thickness = min(p.thickness for p in first.predictor.paths_of.values())
         values[STRENGTH] = 4 * values[ENERGY] / thickness
@@ -144,7 +144,8 @@ def fit_cut(
     free = tuple(p for p in (STRENGTH, ENERGY, FRICTION) if p not in known)
     top = settings.strongest * values[STRENGTH]
     posed = problem(
-        predictor(plain, seen, names, by="simulation", settings=settings, start=values), free=free, start=values,
+        predictor(plain, seen, names, by="simulation", settings=settings, start=values, lenient=True),
+        free=free, start=values,
         bounds={STRENGTH: (0.1 * values[STRENGTH], top), ENERGY: (0.3 * values[ENERGY], 3 * values[ENERGY])},
     )  # fmt: skip
     ended = descend(posed, values, max_steps=max_steps, tolerance=1e-4)
@@ -157,7 +158,9 @@ def fit_cut(
     shift = dict.fromkeys(free, 0.0)
     if numerical:
         coarse = replace(settings, h=max(sizes.values()) * COARSER)
-        other = replace(posed, predictor=predictor(plain, seen, names, by="simulation", settings=coarse, start=values))
+        other = replace(
+            posed, predictor=predictor(plain, seen, names, by="simulation", settings=coarse, start=values, lenient=True)
+        )
         step = np.linalg.lstsq(J, r - other.residuals(found), rcond=None)[0]
         shift = dict(zip(free, np.abs(step).tolist(), strict=True))
     std = {p: float(np.hypot(s, shift[p])) for p, s in zip(free, spread.std, strict=True)}
