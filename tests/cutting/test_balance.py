@@ -6,17 +6,14 @@ import pytest
 from tests.cutting.oracles import layer_energy, layer_stress
 from tests.cutting.records import VALUES, model, record, sample, strokes
 from tissuejax.effects.catalogue import effect, effects
+from tissuejax.effects.effect import Effect
 from tissuejax.errors import InputError
 from tissuejax.experiments.predictor import predictor
 from tissuejax.recordings.files import read
 from tissuejax.recordings.hdf5_writing import write
 
 NAMES = sorted(effects("cutting"))
-OWN = [
-    n
-    for n in NAMES
-    if type(effect(n)).cut is not __import__("tissuejax.effects.effect", fromlist=["Effect"]).Effect.cut
-]
+OWN = [n for n in NAMES if type(effect(n)).cut is not Effect.cut]
 TIME, X = strokes(-0.002, 0.025, -0.002, 0.024)
 SAMPLE = sample(record("there and back", TIME, X, 0.0 * X + 0.1))
 
@@ -71,7 +68,7 @@ def test_neutral_changes_no_bit_and_has_a_derivative(name):
         assert np.linalg.norm(slope - difference) <= 0.02 * np.linalg.norm(difference)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", OWN)
 def test_says_what_it_is(name):
     text = type(effect(name)).__doc__
     assert "Neutral" in text

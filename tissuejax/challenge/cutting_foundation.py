@@ -2,9 +2,9 @@
 
 Each half of the tissue is a Pasternak foundation (stiffness k = M / W across, shear layer mu W / 3 along the path) that
 hardens with compression; the faces are held together by an exponential law with memory, and pushed apart by a wedge
-with a rounded shoulder. Every position of the blade is an equilibrium, found by Newton's method on a tridiagonal system;
-the force follows from virtual work, 2 sum p w'(s) dx, and friction from the pressures. Nothing is shared with the explicit
-finite elements or the balance of energies that a diagnosis uses.
+with a rounded shoulder. Every position of the blade is an equilibrium, found by Newton's method on a tridiagonal
+system; the force follows from virtual work, 2 sum p w'(s) dx, and friction from the pressures. Nothing is shared with
+the explicit finite elements or the balance of energies that a diagnosis uses.
 """
 
 from typing import NamedTuple
