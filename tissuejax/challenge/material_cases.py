@@ -13,6 +13,7 @@ from tissuejax.challenge.strain_laws import Body
 from tissuejax.challenge.strengths import beyond, reach
 from tissuejax.errors import NotConverged
 
+STEP = 0.04  # s, over which a correlation is told
 CATEGORIES = ("none", "one", "two", "three", "unknown")
 SHARES = (0.20, 0.45, 0.14, 0.06, 0.15)
 NOTHING = 1e-3  # size over noise: the told energy has that very term
@@ -47,11 +48,19 @@ def category(index: int) -> str:
     return CATEGORIES[int(np.searchsorted(np.cumsum(SHARES), grid, side="right"))]
 
 
-def correlated(rng: np.random.Generator, n: int, rho: float) -> np.ndarray:
-    """Noise of unit variance with correlation rho between neighbours, white at rho = 0."""
-    white = rng.standard_normal(n)
-    white[1:] *= np.sqrt(1 - rho**2)
-    return lfilter([1.0], [1.0, -rho], white)
+def correlated(rng: np.random.Generator, time: np.ndarray, rho: float) -> np.ndarray:
+    """Noise of unit variance at `time` (s) whose correlation over `STEP` is rho, white at rho = 0.
+
+    A sensor's noise lives in seconds: samples further apart are less alike, rho^(dt/STEP).
+    """
+    white = rng.standard_normal(len(time))
+    keep = rho ** (np.diff(time) / STEP) if rho > 0 else np.zeros(len(time) - 1)
+    white[1:] *= np.sqrt(1 - keep**2)
+    if np.allclose(keep, keep[:1]):
+        return lfilter([1.0], [1.0, -float(keep[0])], white)
+    for k, a in enumerate(keep):
+        white[k + 1] += a * white[k]
+    return white
 
 
 def body(rng: np.random.Generator) -> tuple[Body, str]:
@@ -148,7 +157,10 @@ def _draw(name: str, rng: np.random.Generator, kind: str, turn: int) -> Case:
         tolerated = ["energy-form"]
     specimen = Specimen(base, tuple(added))
     truth = [reported(specimen, t) for t in plan]
-    noises = [np.stack([correlated(rng, len(x), rho) for _ in range(x[:1].size)], -1).reshape(x.shape) for x in truth]
+    noises = [
+        np.stack([correlated(rng, t.time, rho) for _ in range(x[:1].size)], -1).reshape(x.shape)
+        for t, x in zip(plan, truth)
+    ]
     stress = {t.name: x + noise * e for t, x, e in zip(plan, truth, noises)}
     key = {
         "category": kind,
@@ -160,7 +172,7 @@ def _draw(name: str, rng: np.random.Generator, kind: str, turn: int) -> Case:
         "size_over_noise": sizes,
         "all_over_noise": size(specimen),
         "base": {"energy": energy, **base.terms},
-        "noise": {"std": noise, "correlation": rho},
+        "noise": {"std": noise, "correlation": rho, "over": STEP},
         "truth_error_over_noise": {t.name: float(np.sqrt(np.mean(e**2))) for t, e in zip(plan, noises)},
         "held_out": plan[-1].name,
     }

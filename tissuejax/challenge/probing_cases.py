@@ -188,7 +188,7 @@ def _draw(
         clean, more = found.presses, found.key
     noisy, errors = [], {}
     for r in clean:
-        e = np.stack([correlated(rng, len(r.force), rho) for _ in range(3)], -1)
+        e = np.stack([correlated(rng, r.force_time, rho) for _ in range(3)], -1)
         m = rng.standard_normal(r.markers.shape)
         lost = rng.random(r.markers.shape[:2]) < 0.025
         shown = np.where(lost[..., None], np.nan, r.markers + noise[1] * m)
