@@ -69,6 +69,7 @@ def test_what_is_not_known_is_said_in_words():
         values={"a": 0.4, "b": 3456.7, "c": 2100.0},
         std={"a": 7.4e10, "b": 12.0, "c": 900.0},
         at_bound={},
+        intervals={"a": (0.0, 1e11), "b": (3456.7 - 23.52, 3456.7 + 23.52), "c": (300.0, 3900.0)},
     )
     rows = {r["path"]: r for r in sentences.table(fit)}
     assert {r["unit"] for r in rows.values()} == {"kPa"}

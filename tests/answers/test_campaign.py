@@ -1,0 +1,145 @@
+"""Campaigns: the same answers whatever the engine, nothing done twice, nothing lost when something is killed."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from tests.specimens import recording
+from tissuejax.campaign.run import begin, go_on, status, table
+from tissuejax.campaign.store import Store
+from tissuejax.campaign.task import Settings, TooLong, limited
+from tissuejax.cli import main
+from tissuejax.recordings.hdf5_writing import write
+from tissuejax.recordings.recording import Channel, Recording, Sample
+
+STRETCH = np.linspace(1.0, 1.3, 20)
+SETTINGS = Settings("fit", "neo-hookean", multistart=1)
+
+
+def cohort(folder, n=5, bad=True):
+    """Files of n specimens of known stiffness, and one that no neo-Hookean fit can take."""
+    rng, files = np.random.default_rng(3), []
+    time_ = np.arange(20.0)
+    for k in range(n):
+        made = recording("pull", "uniaxial", time_, STRETCH)
+        stress = (1000 + 100 * k) * (STRETCH - STRETCH**-2) + 5 * rng.normal(size=20)
+        channel = Channel(time_, stress, "Pa", 5.0)
+        file = folder / f"s{k}.h5"
+        write(
+            Sample(f"s{k}", {"pull": Recording("pull", "uniaxial", made.inputs, {"nominal_stress": channel}, {})}), file
+        )
+        files.append(str(file))
+    if bad:
+        twin = Recording("again", "uniaxial", made.inputs, {"nominal_stress": channel}, {})
+        first = Recording("pull", "uniaxial", made.inputs, {"nominal_stress": channel}, {})
+        write(Sample("twins", {"pull": first, "again": twin}), folder / "twins.h5")
+        files.append(str(folder / "twins.h5"))
+    return files
+
+
+def answers(folder):
+    store = Store(folder)
+    rows = {t.sample: row for t, row in store.rows(store.planned()[0])}
+    return {name: {k: v for k, v in row.items() if k not in ("seconds", "worker")} for name, row in rows.items()}
+
+
+def test_failures_are_rows_and_only_what_is_missing_is_done(tmp_path):
+    files = cohort(tmp_path)
+    begin(tmp_path / "c", files, SETTINGS)
+    told = go_on(tmp_path / "c")
+    assert (told["cases"], told["done"], told["failed"], told["missing"]) == (6, 5, 1, 0)
+    assert "twins" in told["failures"]
+    assert go_on(tmp_path / "c")["ran"] == 0
+    rows = {r["sample"]: r for r in table(tmp_path / "c")}
+    for k in range(5):
+        assert abs(rows[f"s{k}"]["energy.mu"] - (1000 + 100 * k)) < 4 * rows[f"s{k}"]["std energy.mu"]
+    store = Store(tmp_path / "c")
+    lost = store.planned()[0][2]
+    store.path(lost.key).unlink()
+    assert go_on(tmp_path / "c")["ran"] == 1
+    begin(tmp_path / "c", files, Settings("fit", "neo-hookean", multistart=1, seed=1))  # other settings, other keys
+    assert status(tmp_path / "c")["missing"] == 6
+    assert main(["campaign", "report", str(tmp_path / "c"), "--json"]) == 0
+    assert (tmp_path / "c" / "cases.csv").read_text().count("\n") == 7
+
+
+def test_a_changed_recording_is_another_case(tmp_path):
+    files = cohort(tmp_path, 2, bad=False)
+    begin(tmp_path / "c", files, SETTINGS)
+    before = {t.sample: t.key for t in Store(tmp_path / "c").planned()[0]}
+    cohort(tmp_path, 1, bad=False)
+    made = recording("pull", "uniaxial", np.arange(20.0), STRETCH)
+    channel = Channel(np.arange(20.0), 1200 * (STRETCH - STRETCH**-2), "Pa", 5.0)
+    write(Sample("s1", {"pull": Recording("pull", "uniaxial", made.inputs, {"nominal_stress": channel}, {})}), files[1])
+    begin(tmp_path / "c", files, SETTINGS)
+    after = {t.sample: t.key for t in Store(tmp_path / "c").planned()[0]}
+    assert before["s0"] == after["s0"]
+    assert before["s1"] != after["s1"]
+
+
+def test_a_case_that_takes_its_worker_along_is_given_up(tmp_path):
+    store = begin(tmp_path / "c", cohort(tmp_path, 2, bad=False), SETTINGS, retries=1)
+    first = store.planned()[0][0]
+    (tmp_path / "c" / "running").mkdir(parents=True)
+    (tmp_path / "c" / "running" / first.key).write_text("2")
+    told = go_on(tmp_path / "c")
+    assert (told["done"], told["failed"]) == (1, 1)
+    assert "worker died" in told["failures"]["s0"]
+
+
+def test_the_limit_rings():
+    with pytest.raises(TooLong), limited(0.05):
+        time.sleep(2)
+    with limited(0.05):
+        pass
+    time.sleep(0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["processes", "dask"])
+def test_engines_give_the_same_bits(tmp_path, engine):
+    if engine == "dask" and find_spec("distributed") is None:
+        pytest.skip("the extra `cluster` is not installed")
+    files = cohort(tmp_path, 3)
+    for name in ("serial", engine):
+        begin(tmp_path / name, files, SETTINGS)
+        go_on(tmp_path / name, name, 2)
+    assert json.dumps(answers(tmp_path / "serial"), sort_keys=True) == json.dumps(
+        answers(tmp_path / engine), sort_keys=True
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("whom", ["worker", "client"])
+def test_killing_loses_no_more_than_what_was_under_way(tmp_path, whom):
+    files = cohort(tmp_path, 40, bad=False)
+    begin(tmp_path / "c", files, SETTINGS, retries=2)
+    go = f"go_on({str(tmp_path / 'c')!r}, 'processes', 1)"
+    script = f"from tissuejax.campaign.run import go_on\nif __name__ == '__main__':\n    {go}\n"
+    (tmp_path / "go.py").write_text(script)
+    client = subprocess.Popen([sys.executable, str(tmp_path / "go.py")], start_new_session=True)
+    results = tmp_path / "c" / "results"
+    begun = time.monotonic()
+    while len(list(results.rglob("*.json"))) < 3:
+        assert time.monotonic() - begun < 300
+        time.sleep(0.05)
+    if whom == "worker":
+        row = json.loads(next(results.rglob("*.json")).read_text())
+        os.kill(row["worker"], signal.SIGKILL)
+        assert client.wait(300) == 0
+        assert status(tmp_path / "c")["done"] == 40
+    else:
+        os.killpg(client.pid, signal.SIGKILL)
+        client.wait()
+        there = status(tmp_path / "c")["done"]
+        assert len(list((tmp_path / "c" / "running").iterdir())) <= 1
+        told = go_on(tmp_path / "c")
+        assert told["ran"] == 40 - there
+        assert told["done"] == 40

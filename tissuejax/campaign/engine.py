@@ -1,0 +1,35 @@
+"""What an engine is: it works through tasks, wherever; the store has the answers."""
+
+import abc
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ClassVar
+
+from tissuejax.campaign.store import Store
+from tissuejax.campaign.task import Task
+
+Told = Callable[[dict[str, Any]], None]
+
+
+class Engine(abc.ABC):
+    """One way of working through tasks, a file each.
+
+    Class data:
+        name: as typed after --engine.
+    """
+
+    name: ClassVar[str]
+
+    @abc.abstractmethod
+    def run(self, store: Store, tasks: list[Task], workers: int, told: Told, where: str | None = None) -> None:
+        """Work through the tasks; `told` hears a short row of each. Cases that died with a worker are left missing.
+
+        Args:
+            workers: how many at once.
+            where: an address, for engines that need one.
+        """
+
+
+def work(folder: str, task: dict[str, Any]) -> dict[str, Any]:
+    """Answer one task given as plain data; what engines send to their workers."""
+    return Store(Path(folder)).work(Task.of(task))

@@ -1,0 +1,50 @@
+"""Processes of this machine. One that is killed takes its case with it; the pool is made anew and goes on."""
+
+import multiprocessing
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from typing import ClassVar
+
+from tissuejax.campaign.engine import Engine, Told, work
+from tissuejax.campaign.store import Store
+from tissuejax.campaign.task import Task
+
+AHEAD = 4  # tasks handed out per worker, so that none waits for the client
+
+
+class Processes(Engine):
+    """Spawned, as JAX does not survive a fork."""
+
+    name: ClassVar[str] = "processes"
+
+    def run(self, store: Store, tasks: list[Task], workers: int, told: Told, where: str | None = None) -> None:
+        """See `Engine.run`."""
+        left = list(reversed(tasks))
+        while left:
+            broken = self._pool(store, left, workers, told)
+            if not broken:
+                return
+            left = [task for task in left if store.row(task.key) is None and store.begun(task.key) <= RETRIES]
+
+    def _pool(self, store: Store, left: list[Task], workers: int, told: Told) -> bool:
+        """Work until `left` is empty or a worker dies; what was not finished is put back."""
+        context = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(workers, mp_context=context) as pool:
+            out = {}
+            while left or out:
+                try:
+                    while left and len(out) < AHEAD * workers:
+                        task = left.pop()
+                        out[pool.submit(work, str(store.folder), task.plain())] = task
+                    done, _ = wait(out, return_when=FIRST_COMPLETED)
+                    for future in done:
+                        task = out[future]
+                        told(future.result())
+                        del out[future]
+                except BrokenProcessPool:
+                    left.extend(out.values())
+                    return True
+        return False
+
+
+RETRIES = 2  # times a case is begun again within one run after its worker died

@@ -1,0 +1,158 @@
+"""One case of a campaign: a sample of a file and what is asked of it; and the function that answers it."""
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from tissuejax.cache.key import key
+from tissuejax.errors import InputError
+from tissuejax.recordings.files import read, read_all
+from tissuejax.recordings.recording import Sample
+
+KINDS = ("fit", "diagnose")
+UNSTORED = ("seconds", "versions", "trace")  # of a fit's record: not part of the answer, or too long for a cohort
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is asked of every sample.
+
+    Attributes:
+        kind: "fit" or "diagnose".
+        energy, ogden_form, volumetric, effects: the model; for a diagnosis the effects to try (none: all).
+        holdout: recordings to hold out, where a sample has them.
+        multistart, seed: of a fit.
+    """
+
+    kind: str
+    energy: str
+    ogden_form: str | None = None
+    volumetric: str | None = None
+    effects: tuple[str, ...] = ()
+    holdout: tuple[str, ...] = ()
+    multistart: int = 2
+    seed: int = 0
+
+    def __post_init__(self):
+        if self.kind not in KINDS:
+            raise InputError(f"unknown kind of campaign {self.kind!r}; one of {', '.join(KINDS)}")
+
+
+@dataclass(frozen=True)
+class Task:
+    """One case: the key of its answer, where its sample lies, the settings, and the limit in seconds."""
+
+    key: str
+    file: str
+    sample: str
+    settings: Settings
+    limit: float
+
+    def plain(self) -> dict[str, Any]:
+        """As plain data."""
+        return asdict(self)
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any]) -> "Task":
+        """From plain data."""
+        said = dict(data["settings"])
+        said["effects"], said["holdout"] = tuple(said["effects"]), tuple(said["holdout"])
+        return cls(data["key"], data["file"], data["sample"], Settings(**said), data["limit"])
+
+
+def tasks(files: list[str], settings: Settings, limit: float) -> list[Task]:
+    """A task for every sample of every file; its key is the hash of recordings, settings, code and libraries.
+
+    Raises:
+        InputError: a file that can't be read, or code that changed on disk since it was loaded.
+    """
+    found = []
+    for file in files:
+        for name, sample in read_all(file).items():
+            mark = key(sample, asdict(settings))
+            if mark is None:
+                raise InputError("the package's code changed on disk while it was loaded; start again")
+            found.append(Task(mark, os.fspath(file), name, settings, limit))
+    return found
+
+
+class TooLong(Exception):
+    """A case took longer than its limit."""
+
+
+@lru_cache(maxsize=2)
+def _samples(file: str, changed: float) -> dict[str, Sample]:
+    return read_all(file)
+
+
+def answer(task: Task) -> dict[str, Any]:
+    """The row of a task: "done" with the record, or "failed" with the reason; never raises for what a case may do.
+
+    Everything but "seconds" and "worker" is the same wherever it is computed.
+    """
+    begun = time.perf_counter()
+    row: dict[str, Any] = {"sample": task.sample, "file": task.file, "settings": asdict(task.settings)}
+    try:
+        with limited(task.limit):
+            row |= {"status": "done", "answer": _solved(task)}
+    except TooLong:
+        row |= {"status": "failed", "reason": f"took longer than {task.limit:g} s"}
+    except (KeyboardInterrupt, SystemExit):
+        raise
+    except Exception as error:  # whatever a case does wrong is a row, and the others go on
+        row |= {"status": "failed", "reason": f"{type(error).__name__}: {error}"}
+    return row | {"seconds": time.perf_counter() - begun, "worker": os.getpid()}
+
+
+def _solved(task: Task) -> dict[str, Any]:
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    path = task.file.partition("#")[0]
+    sample = _samples(task.file, os.path.getmtime(path) if Path(path).exists() else 0.0).get(task.sample)
+    sample = read(task.file, task.sample) if sample is None else sample
+    s = task.settings
+    held = tuple(name for name in s.holdout if name in sample.recordings)
+    if s.kind == "diagnose":
+        from tissuejax.diagnosis.diagnose import diagnose
+
+        found = diagnose(sample, s.energy, holdout=held or None, effects=s.effects or None, ogden_form=s.ogden_form)
+        return found.as_dict()
+    from tissuejax.effects.catalogue import effect
+    from tissuejax.energies import catalogue
+    from tissuejax.experiments.predictor import predictor
+    from tissuejax.fitting.least_squares import fit
+    from tissuejax.fitting.setup import problem, split
+    from tissuejax.model import Model
+
+    bulk = catalogue.volumetric(s.volumetric) if s.volumetric else None
+    model = Model(catalogue.energy(s.energy, s.ogden_form), bulk, tuple(effect(name) for name in s.effects))
+    fitted, held = split(sample, (), held)
+    found = fit(problem(predictor(model, sample, fitted)), multistart=s.multistart, holdout=held, seed=s.seed)
+    return {name: value for name, value in found.record().items() if name not in UNSTORED}
+
+
+@contextmanager
+def limited(seconds: float):
+    """Raises `TooLong` inside the block after so many seconds (0: never); needs the main thread and SIGALRM."""
+    if seconds <= 0 or threading.current_thread() is not threading.main_thread() or not hasattr(signal, "SIGALRM"):
+        yield
+        return
+
+    def ring(*_):
+        raise TooLong
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)

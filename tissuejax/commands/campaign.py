@@ -1,0 +1,99 @@
+"""`tissuejax campaign`: one question asked of many samples."""
+
+import argparse
+import csv
+import io
+from pathlib import Path
+from typing import ClassVar
+
+from tissuejax.campaign.run import begin, engines, go_on, status, table
+from tissuejax.campaign.task import Settings
+from tissuejax.commands.arguments import add_model, positive
+from tissuejax.commands.command import Command, Reply
+from tissuejax.errors import InputError
+from tissuejax.progress import for_terminal
+from tissuejax.storage import write_text
+
+ACTIONS = ("run", "resume", "status", "report")
+
+
+class Campaign(Command):
+    """Run, resume, look at and report a campaign."""
+
+    name: ClassVar[str] = "campaign"
+    order: ClassVar[int] = 45
+    summary: ClassVar[str] = "fit or diagnose thousands of samples, on one machine or a cluster; nothing is done twice"
+    teaches: ClassVar[str] = """
+Ask one question of every sample of many files. FOLDER holds the plan and one result file a case, under the hash of its
+recordings, the settings and the code: what is there is not done again, a killed run goes on, a failure is a row.
+
+  tissuejax campaign run out/ecoflex fits/ecoflex/ecoflex-each.toml --energy reduced-polynomial-2 --engine processes
+  tissuejax campaign run out/beef day1.toml day2.toml --kind diagnose --energy neo-hookean --limit 600
+  tissuejax campaign status out/ecoflex
+  tissuejax campaign resume out/ecoflex --engine dask --scheduler tcp://login:8786      --failed does failures again
+  tissuejax campaign report out/ecoflex                                                 cases.csv and a page
+
+Engines: serial, processes, dask (extra `cluster`). docs/cohort.md shows Slurm.
+"""
+
+    def arguments(self, parser: argparse.ArgumentParser) -> None:
+        """ACTION FOLDER [FILE ...] and settings."""
+        parser.add_argument("action", choices=ACTIONS, help="run, resume, status or report")
+        parser.add_argument("folder", type=Path, metavar="FOLDER", help="of the campaign")
+        parser.add_argument("files", nargs="*", metavar="FILE", help="for run: recording files or side files")
+        parser.add_argument("--kind", default="fit", choices=["fit", "diagnose"], help="what is asked (default fit)")
+        add_model(parser, required=False)
+        parser.add_argument(
+            "--holdout", action="append", default=[], metavar="RECORDING", help="hold it out where there"
+        )
+        parser.add_argument("--multistart", type=int, default=2, metavar="N", help="starts of a fit (default 2)")
+        parser.add_argument("--engine", default="serial", metavar="NAME", help=f"{', '.join(sorted(engines()))}")
+        parser.add_argument("--workers", type=int, default=2, metavar="N", help="at once (default 2)")
+        parser.add_argument("--scheduler", metavar="ADDRESS", help="of Dask, e.g. tcp://login:8786")
+        parser.add_argument("--limit", type=float, default=0.0, metavar="S", help="seconds a case may take (0: any)")
+        parser.add_argument("--retries", type=int, default=1, metavar="N", help="of a case that died (default 1)")
+        parser.add_argument("--failed", action="store_true", help="do failed cases again")
+
+    def run(self, given: argparse.Namespace) -> Reply:
+        """One of the four actions."""
+        if given.action == "run":
+            if not given.files or given.energy is None:
+                raise InputError("campaign run needs FILEs and --energy")
+            if given.limit < 0 or given.retries < 0:
+                raise InputError("--limit and --retries are 0 or more")
+            settings = Settings(
+                given.kind, given.energy, given.ogden_form, given.volumetric, tuple(given.effect), tuple(given.holdout),
+                positive(given.multistart, "--multistart"),
+            )  # fmt: skip
+            begin(given.folder, given.files, settings, given.limit, given.retries)
+        if given.action in ("run", "resume"):
+            workers = positive(given.workers, "--workers")
+            told = go_on(given.folder, given.engine, workers, given.scheduler, given.failed, for_terminal())
+            return Reply(
+                told,
+                _text(told) + f"\n{told['ran']} done now in {told['seconds']:.1f} s, {told['per_second']:.2g} a second",
+            )
+        if given.action == "status":
+            told = status(given.folder)
+            return Reply(told, _text(told))
+        return _report(given.folder)
+
+
+def _text(told: dict) -> str:
+    lines = [f"{told['cases']} cases: {told['done']} done, {told['failed']} failed, {told['missing']} missing"]
+    lines += [f"  ! {sample}: {reason}" for sample, reason in list(told["failures"].items())[:20]]
+    return "\n".join(lines)
+
+
+def _report(folder: Path) -> Reply:
+    from tissuejax.report.cohort_page import write_cohort
+
+    rows = table(folder)
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns)
+    writer.writeheader()
+    writer.writerows(rows)
+    files = {"table": write_text(folder / "cases.csv", text.getvalue())} | write_cohort(rows, status(folder), folder)
+    told = status(folder) | {"files": {n: str(p) for n, p in files.items()}}
+    return Reply(told, "\n".join([_text(told), *(str(p) for p in files.values())]))
