@@ -55,6 +55,7 @@ def line(tissue: Matter, stage) -> np.ndarray:
 
 def main(folder: Path) -> str:
     """Write result.json and figures/nodule.png; the answer in a sentence."""
+    (folder / "figures").mkdir(exist_ok=True)
     found, fine = {}, np.linspace(SITES[0], SITES[-1], 481)
     figure = Figure(figsize=(6, 3.4), layout="constrained")
     ax = figure.subplots()

@@ -231,6 +231,7 @@ def main(folder: Path) -> str:
     """Run all of it; write result.json and figures/drag.png; the answer in a sentence."""
     shared = Path(os.environ.get("TISSUEJAX_SHARED", folder.resolve().parents[2] / "shared"))
     out = folder.resolve().parents[1] / "out" / "play-lobe"
+    (folder / "figures").mkdir(exist_ok=True)
     out.mkdir(parents=True, exist_ok=True)
     made, size = tabulated(out)
     surrogate = made.surrogate

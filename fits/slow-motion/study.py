@@ -71,6 +71,7 @@ def pressed(speed: float) -> dict:
 
 def main(folder: Path) -> str:
     """Write result.json and figures/slow.png; the answer in a sentence."""
+    (folder / "figures").mkdir(exist_ok=True)
     runs = {speed: pressed(speed) for speed in SPEEDS}
     slow = runs[SPEEDS[0]]
     table = {
