@@ -8,6 +8,7 @@ import numpy as np
 
 from tissuejax.commands.command import Command, Reply
 from tissuejax.recordings.files import names, read
+from tissuejax.recordings.layouts import LAYOUTS
 from tissuejax.recordings.recording import Recording, Sample
 from tissuejax.recordings.remarks import remarks
 from tissuejax.report.scales import display
@@ -96,8 +97,9 @@ def described(sample: Sample) -> dict:
 
 
 def _recording(recording: Recording) -> dict:
+    units = {item.path: item.unit for item in LAYOUTS.get(recording.experiment, ())}
     inputs = {
-        name: {"n": len(v), "min": float(np.nanmin(v)), "max": float(np.nanmax(v))}
+        name: {"n": len(v), "min": float(np.nanmin(v)), "max": float(np.nanmax(v)), "unit": units.get(name, "1")}
         for name, v in ((n, np.asarray(v, float)) for n, v in recording.inputs.items())
         if v.size
     }
@@ -129,11 +131,16 @@ def text_of(record: dict) -> list[str]:
         lines.append(
             f"  geometry: {g['cells']} {g['cell_type']} cells, {g['points']} nodes ({g['fixed']} fixed), {size} mm"
         )
+    if record["notes"]:
+        lines.append(f"  {record['notes']}")
     for name, r in record["recordings"].items():
         lines.append(f"  {name}: {r['experiment']}")
         for key, i in r["inputs"].items():
             if "time" not in key:
-                lines.append(f"    did       {key:<18} {i['min']:.4g} to {i['max']:.4g}, {i['n']} samples")
+                factor, unit = display(i["unit"], max(abs(i["min"]), abs(i["max"])))
+                unit = "" if unit == "1" else f" {unit}"
+                span = f"{i['min'] / factor:.4g} to {i['max'] / factor:.4g}{unit}"
+                lines.append(f"    did       {key:<18} {span}, {i['n']} samples")
         for key, c in r["channels"].items():
             factor, unit = display(c["unit"], max(abs(c["min"] or 0), abs(c["max"] or 0)))
             span = (

@@ -148,6 +148,8 @@ def chosen(
             mask |= _phase(x[inside], cycle, selection.phase)
         if selection.cycles is not None:
             notes.append(f"Cycle {first}{f' to {last}' if last != first else ''} of {len(cycles)} kept.")
+        if first > 1:
+            notes.append("What the tissue remembers of the cycles before is not in the recording.")
         if selection.phase:
             notes.append(f"The {selection.phase} alone is kept.")
         keep[inside[~mask]] = False
