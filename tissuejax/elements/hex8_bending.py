@@ -31,16 +31,13 @@ MODE = {pair: a for a, pair in enumerate(PAIRS)} | {pair[::-1]: a for a, pair in
 
 
 class Reference(NamedTuple):
-    """`plain`: of `Hex8`; `axes`: rows are the local axes, (k, J, E); `length`: half-edges along them, (k, E), m."""
+    """`plain`: of `Hex8`; `axes`: rows are the local axes, (k, J, E); `length`: half-edges along them, (k, E), m;
+    `volume`, m^3."""
 
     plain: Plain
     axes: Float[Array, "3 3 E"]
     length: Float[Array, "3 E"]
-
-    @property
-    def volume(self) -> Float[Array, " E"]:
-        """m^3."""
-        return self.plain.volume
+    volume: Float[Array, " E"]
 
 
 class Hex8Bending(Element):
@@ -66,7 +63,7 @@ class Hex8Bending(Element):
         edges = jnp.einsum("ai,jae->ije", jnp.asarray(SIGNS) / 8, x)  # dX/dxi_i: rows of half-edges
         u, _, vt = jnp.linalg.svd(jnp.moveaxis(edges, -1, 0))
         axes = jnp.moveaxis(u @ vt, 0, -1)  # the rotation nearest to the edges' directions
-        return Reference(plain, axes, jnp.sqrt(jnp.sum(edges * edges, 1)))
+        return Reference(plain, axes, jnp.sqrt(jnp.sum(edges * edges, 1)), plain.volume)
 
     def gradient(self, reference: Reference, u: Float[Array, "3 8 E"]) -> tuple[Tensor, Any]:
         F, q = Hex8().gradient(reference.plain, u)
@@ -97,9 +94,10 @@ class Hex8Bending(Element):
         pulled = jnp.einsum("ake,kJe->aJe", slope, reference.axes)  # dW/d(F^T q)
         by_mode = jnp.einsum("iJe,aJe->aie", F, pulled)  # dW/dq at fixed F
         by_gradient = jnp.einsum("aie,aJe->iJe", q, pulled)  # dW/dF at fixed q
-        # `Hex8` takes hourglass forces as stiffening * stiffness * memory
-        plain = reference.plain._replace(stiffening=jnp.ones_like(reference.volume))
-        return Hex8().forces(plain, P + by_gradient / reference.volume, by_mode, jnp.ones_like(reference.volume))
+        # `Hex8` takes volume * P and stiffening * stiffness * memory: both are given whole
+        one = jnp.ones_like(reference.volume)
+        plain = reference.plain._replace(stiffening=one, volume=one)
+        return Hex8().forces(plain, reference.volume * P + by_gradient, by_mode, one)
 
     def hourglass_energy(self, reference: Reference, memory: Any, stiffness: Float[Array, " E"]) -> Array:
         q, F = memory
