@@ -152,7 +152,7 @@ def test_amplitudes_find_the_gain_that_was_put_in_and_rest_where_nothing_is():
     widths = np.full(len(parts), 0.02)
     v, m = amplitudes(linear, parts, widths, blocked, widths**2)
     share = dict(zip((p.name for p in parts), np.sqrt(v), strict=True))
-    assert share["gain"] == pytest.approx(0.02, rel=0.5)
+    assert math.hypot(share["gain"], share["own law"]) == pytest.approx(0.02, rel=0.5)  # of its own, at any strain
     assert share["law"] < 0.01
     assert share["white"] < 0.006
     assert np.isfinite(amplitude_mass(m, v, widths))

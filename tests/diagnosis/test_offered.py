@@ -1,11 +1,14 @@
 """What a protocol can't show is not offered as an answer, and the reader is told."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tissuejax.diagnosis.bench import Candidate
 from tissuejax.diagnosis.offered import Protocol, offered
 from tissuejax.recordings.recording import Channel, Recording, Sample
+from tissuejax.recordings.specimens import NO_TIME
 
 TIME = np.linspace(0, 20, 200)
 RAMP = 1 + 0.015 * TIME
@@ -65,6 +68,8 @@ def test_a_change_of_volume_needs_tests_of_unlike_constraint():
 def test_specimens_can_differ_only_where_there_are_several_recordings():
     assert "specimen-scatter" not in names(CYCLE)
     assert "specimen-scatter" in names(CYCLE, CYCLE)
+    untimed = replace(sample(CYCLE, CYCLE), notes=NO_TIME)
+    assert "specimen-scatter" in offered(untimed, CANDIDATES)[0]
 
 
 def test_what_was_left_out_is_said_with_its_reason():

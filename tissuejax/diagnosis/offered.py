@@ -115,20 +115,20 @@ def offered(
 ) -> tuple[dict[str, Candidate], list[str]]:
     """Candidates that the sample's recordings can show, and remarks on what was left out.
 
-    Two are added that have no parameters but let a part of the discrepancy be large: a stiffness of each recording's
-    own (specimens that differ, or a gain that changed: stress and stretch alone can't tell), and a rate-independent
-    hysteresis.
+    Two are added that have no parameters but let a part of the discrepancy be large: a stiffness and a law of each
+    recording's own (specimens that differ, or a gain that changed: stress and stretch can't tell), and a
+    rate-independent hysteresis.
 
     Args:
         names: effects asked for; all by default.
     """
     kept, remarks = dict(candidates), []
-    for own in (SCATTER, HYSTERESIS):
-        if names is None or own.name in names:
-            kept[own.key] = own
     if not timed(sample):
         kept = without_clock(kept)
         remarks.append("no time was recorded: effects that act in time (relaxation, drift, aging) were not tried")
+    for own in (SCATTER, HYSTERESIS):
+        if names is None or own.name in names:
+            kept[own.key] = own
     protocol, why = Protocol.of(sample), {}
     for name, (shown, reason) in NEEDS.items():
         if any(c.name == name for c in kept.values()) and not shown(protocol):

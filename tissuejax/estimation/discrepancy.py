@@ -7,7 +7,8 @@ the model of Kennedy and O'Hagan (2001), with the parts that rests of material t
 | part | form of B |
 |---|---|
 | law | squared exponential in strain (0.5 and 0.12 of the range) times the stress, shared by the recordings of a mode |
-| gain | constant times the stress, of each recording's own |
+| gain | constant times the stress, of each recording's own (specimens differ in stiffness, load cells in gain) |
+| own law | squared exponential in strain (0.5) times the stress, of each recording's own (specimens differ in form) |
 | hysteresis | squared exponential in strain (0.4) times a loading state, in three shapes, shared by a mode |
 | slow | exponential in time (0.05, 0.25 and 1.5 of the recording), of each recording's own |
 | white | what scatters from sample to sample beyond the stated noise |
@@ -23,6 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.linalg import block_diag
 
 LAW = {"law": 0.5, "fine law": 0.12}  # correlation lengths, of the range of strain
 ALIKE = 0.4  # correlation length of hysteresis, of the range of strain
@@ -109,18 +111,21 @@ class Discrepancy:
     Attributes:
         laws: factors of the laws about a stress of one, by name.
         belongs: a column for every recording, one where a row belongs to it.
+        own: factors of a law of each series' own, about a stress of one.
         fixed: the parts that don't depend on the prediction.
     """
 
     laws: tuple[tuple[str, Float[np.ndarray, "N r"]], ...]
     belongs: Float[np.ndarray, "N R"]
+    own: Float[np.ndarray, "N q"]
     fixed: tuple[Part, ...]
 
     def about(self, prediction: Float[np.ndarray, " N"]) -> tuple[Part, ...]:
         """The parts beside this prediction, Pa; always in the same order."""
         stress = prediction[:, None]
         laws = tuple(Part(name, "law", stress * factor) for name, factor in self.laws)
-        return (*laws, Part("gain", "gain", stress * self.belongs), *self.fixed)
+        several = (Part("gain", "gain", stress * self.belongs), Part("own law", "gain", stress * self.own))
+        return (*laws, *several, *self.fixed)
 
 
 def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"]) -> Discrepancy:
@@ -160,4 +165,5 @@ def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"]) -> Dis
         scatter.append(np.diag((s.peak * own / max(float(np.median(own)), 1e-300)) ** 2))
     out.append(Part("white", "white", within=tuple(scatter)))
     laws = tuple((name, shared(length)) for name, length in LAW.items())
-    return Discrepancy(laws, (belongs[:, None] == np.arange(len(recordings))).astype(float), tuple(out))
+    own = block_diag(*(smooth_factor(s.strain, LAW["law"]) for s in series))
+    return Discrepancy(laws, (belongs[:, None] == np.arange(len(recordings))).astype(float), own, tuple(out))

@@ -9,6 +9,7 @@ PARTS = {
     "law": "smooth in stretch, shared by recordings (another law)",
     "fine law": "bends in stretch, shared by recordings",
     "gain": "a gain of each recording's own",
+    "own law": "a law of each recording's own",
     "hysteresis, step": "hysteresis that turns at once",
     "hysteresis, narrow": "hysteresis that turns quickly",
     "hysteresis, wide": "hysteresis that turns slowly",
