@@ -15,6 +15,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from tissuejax.mesh.columns import Lobe
 from tissuejax.mesh.quality import cell_volumes
+from tissuejax.surrogate.cardinal import design, through
 from tissuejax.surrogate.modes import Modes, modes
 from tissuejax.surrogate.places import Box
 from tissuejax.surrogate.ramp import Ramp
@@ -23,6 +24,7 @@ from tissuejax.surrogate.site_mesh import CORE, PER_RADIUS, Grid, lines, nodes
 TOLERANCE, MOST = 0.01, 64
 DOUBLE = np.array([1.0, 1, 1, 2, 2, 2])  # off-diagonal components count twice in S : E
 POINTS = 26  # material cells along an axis at most
+FINEST = 2e-3  # m between the places of the memory's tables
 
 
 class Material(NamedTuple):
@@ -68,6 +70,27 @@ def read_off(material: Material, lobe: Lobe, grid: Grid, place, fields: Float[np
     return np.moveaxis(RegularGridInterpolator(own, values)(inside), -1, 0)
 
 
+def between_sites(box: Box, ramps: Sequence[Ramp]) -> tuple[tuple[int, int], list[Ramp]]:
+    """Places no more than `FINEST` apart, and the fields there, interpolated between the sites in the mesh that moves.
+
+    Seen from a fixed point of the material the stress under a passing ball changes over the width of the contact, and
+    sites that are good enough for the force are too far apart for it. Seen from the ball it hardly changes.
+    """
+    counts, rows = [], []
+    for n, gap in zip(box.counts, box.spacing):
+        counts.append((n - 1) * max(1, int(np.ceil(gap / FINEST - 1e-9))) + 1)
+        rows.append((design(np.linspace(0, n - 1, counts[-1]), max(n - 1, 1)) @ through(n)).astype(np.float32))
+
+    def spread(name):
+        some = np.stack([getattr(r, name) for r in ramps]).astype(np.float32).reshape(*box.counts, -1)
+        some = np.einsum("ai,bj,ijk->abk", *rows, some, optimize=True)
+        return some.reshape(-1, *getattr(ramps[0], name).shape)
+
+    places = box._replace(counts=tuple(counts)).sites().reshape(-1, 2)
+    strain, stress = spread("strain"), spread("stress")
+    return tuple(counts), [ramps[0]._replace(place=p, strain=e, stress=s) for p, e, s in zip(places, strain, stress)]
+
+
 class Projected(NamedTuple):
     """b (k, M): coefficients of the stress, Pa sqrt(m^3); e (k, M): of the strain, sqrt(m^3); and the modes."""
 
@@ -80,7 +103,10 @@ def projected(material: Material, lobe: Lobe, grid: Grid, ramps: Sequence[Ramp],
     """All states of all ramps in stress modes."""
     metric = (material.volume[:, None] * DOUBLE).ravel()
     read = lambda name: np.concatenate(  # noqa: E731
-        [read_off(material, lobe, grid, r.place, getattr(r, name)).reshape(len(r.depth), -1) for r in ramps]
+        [
+            read_off(material, lobe, grid, r.place, getattr(r, name)).reshape(len(r.depth), -1).astype(np.float32)
+            for r in ramps
+        ]
     )
     stress, strain = read("stress"), read("strain")
     found = modes(stress, tolerance, MOST, metric)

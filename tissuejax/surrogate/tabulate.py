@@ -42,8 +42,17 @@ def surrogate(matter: Matter, box: Box, grid: Grid, ramps: list[Ramp], prony: tu
     memory = None
     if prony is not None:
         material = stress_memory.material(matter.lobe, box, grid)
-        kept = stress_memory.projected(material, matter.lobe, grid, ramps)
-        memory = Memory(over(kept.stress / deep), over(kept.strain / deep), *(np.asarray(v, float) for v in prony))
+        counts, dense = stress_memory.between_sites(box, ramps)
+        kept = stress_memory.projected(material, matter.lobe, grid, dense)
+        close = box._replace(counts=counts)
+        fine = [*(through(n) for n in counts), floor]
+        below = np.tile(levels, len(dense))[:, None]
+
+        def everywhere(values):
+            gaps = np.append(close.spacing, 1 / box.depths)
+            return table(origin, gaps, (values / below).reshape(*counts, box.depths, -1), fine)
+
+        memory = Memory(everywhere(kept.stress), everywhere(kept.strain), *(np.asarray(v, float) for v in prony))
     settled, settled_shapes, where = _moving_mesh(matter, box, grid)
     surface = Surface(
         grid.counts, over(moved @ found.shapes.T / deep), found.shapes.reshape(len(found.shapes), -1, 3),
