@@ -9,6 +9,7 @@ all recordings fitted with equal weight, as it comes and with its default starts
 """
 
 import json
+import subprocess
 import sys
 import time
 import tomllib
@@ -156,6 +157,12 @@ def ours(sample: Sample, law: str, timed: bool) -> tuple[float, dict, float]:
     return rmse, {k: float(v) for k, v in found.values.items()}, time.perf_counter() - begun
 
 
+def code() -> str:
+    """The commit that is measured, as far as a checkout tells."""
+    said = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True)
+    return said.stdout.strip()
+
+
 def bare(sample: Sample) -> Sample:
     """Without stated noise and without the remark on time, so that both minimise the plain sum of squares."""
     found = {}
@@ -188,6 +195,7 @@ def main(wanted: list[str]) -> None:
             ratio = mine / rmse
             row = {
                 "set": name,
+                "code": code(),
                 "law": law,
                 "prony_terms": TERMS if timed else 0,
                 "peak_Pa": peak,
