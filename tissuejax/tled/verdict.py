@@ -19,6 +19,8 @@ def halved(scene: Scene) -> Scene:
     changes = {"clock.steps": 2 * scene.clock.steps}
     if scene.probe is not None:
         changes["probe.mass"] = scene.probe.mass / 4
+    if scene.faces is not None:
+        changes["faces.mass"] = scene.faces.mass / 4
     return scene.put(changes)
 
 
@@ -31,6 +33,8 @@ def check(out: "Outcome", scene: Scene) -> None:
     """Raise `UnstableSimulation` if the run failed or the probe went through the surface (host side)."""
     if int(out.failed) >= 0:
         raise UnstableSimulation(_broken(out, scene))
+    if scene.faces is not None:  # a blade: how far it sinks in is in the energy balance
+        return
     frame = int(out.pierced(scene))
     if frame >= 0:
         raise UnstableSimulation(_pierced(out, scene, frame))
@@ -47,6 +51,12 @@ def _broken(out, scene) -> str:
         f"the simulation broke down by t = {float(out.end_time[frame]):.4g} s (frame {frame}): element {element} near "
         f"{place} is inverted or no longer finite; the step was {float(scene.clock.step) * 1e3:.3g} ms. "
     )
+    if scene.faces is not None:
+        return told + (
+            "Where a blade enters soft tissue the first elements fold: take tissue that resists compression (K ten "
+            "times the shear modulus or more), other elements there, a strength that the mesh can carry and that parts "
+            "within the blade's thickness (`tissuejax cut resolve`), or begin in a short notch"
+        )
     if _under_probe(element, scene):
         return told + (
             "Take a smaller step (stiffer parameters need one), less time compression, less stiffness damping, or a "
