@@ -1,0 +1,39 @@
+"""The page of the study: tables of every part that was run, and the blade's force against its closed form."""
+
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from tissuejax.report.page import png, render
+from tissuejax.storage import write_bytes, write_text
+
+
+def write(folder: Path, found: dict) -> Path:
+    """report.html and figures/force.png from result.json."""
+    tables = []
+    for name, part in found.items():
+        runs = part.get("runs") if isinstance(part, dict) else None
+        runs = runs or [part]
+        plain = [k for k, v in runs[0].items() if isinstance(v, int | float | str)]
+        rows = [[f"{r[k]:.4g}" if isinstance(r.get(k), float) else r.get(k, "") for k in plain] for r in runs]
+        if plain:
+            tables.append({"title": name, "columns": [k.replace("_", " ") for k in plain], "rows": rows})
+        if "differences" in part:
+            rows = [[k, f"{v:.2g}"] for k, v in part["differences"].items()]
+            columns = ["parameter and relative step", "derivative against central difference"]
+            tables.append({"title": "derivatives, step by step", "columns": columns, "rows": rows})
+    shown = []
+    if any("series" in r for r in found.get("steady", {}).get("runs", [])):
+        figure = Figure(figsize=(8, 3.2), layout="constrained")
+        ax = figure.subplots()
+        for r in found["steady"]["runs"]:
+            ax.plot(*r["series"], label=f"h {r['h_mm']:g} mm", linewidth=1.2)
+        ax.axhline(found["steady"]["runs"][0]["expected_N_m"], color="k", linewidth=0.8, linestyle="--")
+        ax.set(xlabel="travel of the blade (mm)", ylabel="force per depth (N/m)")
+        ax.legend(frameon=False, fontsize=8)
+        picture = png(figure)
+        (folder / "figures").mkdir(exist_ok=True)
+        write_bytes(folder / "figures" / "force.png", picture)
+        shown = [{"name": "force", "caption": "Force on the blade; dashed: closed form.", "png": picture}]
+    page = render("cutting.html.j2", title="Is the cutting simulation right?", tables=tables, figures=shown)
+    return write_text(folder / "report.html", page)
