@@ -56,8 +56,8 @@ def draw(name: str, seed: int, index: int) -> Case:
     picked = None if index % NULLS == 0 else EFFECTS[(index - index // NULLS - 1) % len(EFFECTS)]
     slab = Slab(0.04, rng.uniform(0.008, 0.015), mu := rng.uniform(1000, 4000), 12 * mu, rng.uniform(0.2, 1.0))
     knife = Knife(rng.uniform(3.5e-4, 8e-4), np.tan(np.radians(rng.uniform(10, 18))), 0.0)
-    G, tau = rng.uniform(8, 40), rng.uniform(3, 5)
-    tau = tau * G / knife.thickness  # parts at two fifths to two thirds of the blade's thickness
+    G, tau = rng.uniform(8, 40), rng.uniform(2.0, 2.6)
+    tau = tau * G / knife.thickness  # parts within about the thickness of the blade
     knife = knife._replace(penalty=80 * tau / knife.thickness)
     trials = _strokes(rng, slab)
     pure = {t.name: _force(t, slab, knife, G, tau, None, rng) for t in trials}

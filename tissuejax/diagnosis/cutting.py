@@ -1,11 +1,12 @@
 """The bench of cuts: the force against the motion by the balance of energies, with every effect of cutting in it.
 
 A prediction takes microseconds, so the search of material tests serves cuts as it is. The balance has no law of
-parting: at the entry it lets the force set in over a length, which belongs to the base model with the toughness.
+parting: at the entry it lets the force set in over a length, which belongs to the base model with the toughness, and where the
+blade turns or comes to the end of an older cut its samples are left out.
 
-The tissue's own modulus is held at the energy's default, scaled to the size of the force. Wedging and toughness have
-one sum in a first pass, so "blade-friction" means a force that grows with the length cut; its coefficient is that of
-the assumed modulus (`tissuejax cut fit` with the measured modulus gives the number).
+The tissue's own modulus is scaled to the size of the force, and wedging follows the volumetric modulus, which is fitted
+with the base: a return stroke or a second pass tells it from toughness. A friction coefficient is relative to that
+modulus (`tissuejax cut fit` with the measured one gives the number).
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,14 +23,15 @@ from tissuejax.effects.catalogue import effects, suited
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.volumetric import Quadratic
 from tissuejax.errors import unknown
-from tissuejax.experiments.cutting_record import FORCE
+from tissuejax.experiments.cutting_record import FORCE, Path
 from tissuejax.experiments.predictor import predictor
 from tissuejax.model import Model
 from tissuejax.recordings.recording import Sample
 
-BASE = ("cohesion.energy", "effects.onset.longer")
+BASE = ("cohesion.energy", "effects.onset.longer", "volumetric.K")
 STIFF = 10.0  # bulk over shear modulus where the tissue is not known
-WEDGING = 0.3  # share of the force that the assumed modulus may give to wedging
+TURNING = 3.0
+WEDGING = 0.05  # share of the force that the modulus gives to wedging at the start
 
 
 class CuttingBench(Bench):
@@ -51,10 +53,11 @@ class CuttingBench(Bench):
         tried = [suited(n, "cutting") for n in known if not names or n in names]
         model = Model(energy, Quadratic(), (suited("onset", "cutting"), *tried), cohesion=law("bilinear"))
         p = predictor(model, sample, (*fitted, *held_out))
-        segments, ys, sigmas, at = [], [], [], 0
+        segments, ys, sigmas, at, kept = [], [], [], 0, {}
         for name in p.names:
             seen, path = p.sample.recordings[name].channels[FORCE], p.paths_of[name]
-            y, time = np.asarray(seen.values, float), np.asarray(seen.time, float)
+            kept[name] = np.flatnonzero(steady(path, np.asarray(seen.time, float)))
+            y, time = np.asarray(seen.values, float)[kept[name]], np.asarray(seen.time, float)[kept[name]]
             rows, at = slice(at, at + len(y)), at + len(y)
             drive = np.interp(time, path.time, path.x)
             segments.append(Segment(name, FORCE, "", rows, time, "N", drive, "place", "m"))
@@ -68,6 +71,8 @@ class CuttingBench(Bench):
         declared = model.declared
         free = {q: _free(d) for q, d in declared.items()}
         free["cohesion.energy"] = Free(1e-3 * top, 1e2 * top, 0.1, "J/m^2", log=True)
+        K = start["volumetric.K"]
+        free["volumetric.K"] = Free(1e-4 * K, 1e2 * K, 0.3, "Pa", log=True)
         candidates = {
             e.name: Candidate(
                 e.name, tuple(f"effects.{e.name}.{a}" for a in e.amplitudes),
@@ -77,7 +82,7 @@ class CuttingBench(Bench):
             for e in tried
         }  # fmt: skip
         bench = cls(segments, y, np.concatenate(sigmas), fitted, held_out, BASE, free, start, candidates)
-        bench._p, bench._order, bench._programs = p, list(declared), {}
+        bench._p, bench._order, bench._programs, bench._kept = p, list(declared), {}, kept
         bench.warnings.append(
             "the tissue's modulus is not in a cut: a friction coefficient is relative to an assumed one"
         )
@@ -104,9 +109,27 @@ class CuttingBench(Bench):
                 key = (s.recording, kind)
                 if key not in self._programs:
                     self._programs[key] = jax.jit(make(s.recording))
-                out[s.rows] = np.asarray(self._programs[key](vector))
+                out[s.rows] = np.asarray(self._programs[key](vector))[self._kept[s.recording]]
         self.spent += 1.0 if kind == "run" else 10.0
         return out
+
+
+def steady(path: Path, time: Float[np.ndarray, " m"]) -> np.ndarray:
+    """True where a balance of energies has something to say: not within `TURNING` bevels of a turn of the blade, of the
+    end of a cut made before or of the far side of the tissue, nor within one of the entry."""
+    bevel = 0.5 * path.thickness / np.tan(path.angle / 2)
+    step = np.diff(path.x, prepend=path.x[0])
+    heading = np.sign(np.where(np.abs(step) > 1e-9, step, 0.0))
+    last, since, way = 1.0, np.inf, np.zeros(len(step))
+    for i, (h, d) in enumerate(zip(heading, np.abs(step), strict=True)):
+        turned = h != 0 and h != last
+        last, since = (h, 0.0) if turned else (last, since + d)
+        way[i] = since
+    old = np.maximum.accumulate(np.concatenate([[path.notch], path.front[:-1]]))
+    joining = (np.abs(path.x - old) < TURNING * bevel) & np.isfinite(way)
+    out = (path.x > path.length - bevel) | (np.abs(path.x) < bevel)
+    calm = (way > TURNING * bevel) & (heading != 0) & ~joining & ~out
+    return np.interp(time, path.time, calm) > 0.99
 
 
 def strokes_to_settle(sample: Sample, bench: CuttingBench, verdict) -> list[str]:

@@ -84,6 +84,8 @@ def path_of(recording: Recording, geometry: Geometry) -> Path:
     grown = np.diff(front, prepend=front[0])
     moved = np.where(np.abs(step) > 1e-12, step, 1.0)
     fresh = np.clip(np.where(np.abs(step) > 1e-12, grown / moved, 0.0), 0, 1)
+    moving = np.maximum.accumulate(np.where(np.abs(step) > 1e-12, np.arange(len(step)), 0))
+    fresh = fresh[moving]  # at rest the blade is held by what it was parting
     speed = np.gradient(x, time)
     angle = np.radians(float(recording.attributes.get("blade/angle", ANGLE)))
     inside = (x > 0) & (x < length)
