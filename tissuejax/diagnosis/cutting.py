@@ -1,8 +1,8 @@
 """The bench of cuts: the force against the motion by the balance of energies, with every effect of cutting in it.
 
 A prediction takes microseconds, so the search of material tests serves cuts as it is. The balance has no law of
-parting: at the entry it lets the force set in over a length, which belongs to the base model with the toughness, and where the
-blade turns or comes to the end of an older cut its samples are left out.
+parting: at the entry it lets the force set in over a length, which belongs to the base model with the toughness, and
+where the blade rests, turns or comes to the end of an older cut its samples are left out.
 
 The tissue's own modulus is scaled to the size of the force, and wedging follows the volumetric modulus, which is fitted
 with the base: a return stroke or a second pass tells it from toughness. A friction coefficient is relative to that
