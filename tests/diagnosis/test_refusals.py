@@ -57,13 +57,15 @@ def test_an_unknown_hold_out_is_answered_with_the_known_ones():
 
 
 def test_fewer_samples_than_parameters():
-    with pytest.raises(InputError, match="2 samples for 3 parameters"):
-        diagnose(sample(n=2), "reduced-polynomial-3", **QUICK)
+    with pytest.raises(InputError, match="3 samples for 3 parameters"):
+        diagnose(sample(n=3), "reduced-polynomial-3", **QUICK)
+    with pytest.raises(InputError, match="2 samples of nominal_stress; expected at least 3"):
+        diagnose(sample(n=2), "neo-hookean", **QUICK)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_values_that_are_not_finite(bad):
-    with pytest.raises(InputError, match="r1"):
+    with pytest.raises(InputError, match="r1.*nominal_stress are not finite"):
         diagnose(sample(values=lambda x: np.where(x > 1.1, bad, 10.0)), "neo-hookean", **QUICK)
 
 

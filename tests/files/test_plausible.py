@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tissuejax.errors import InputError
-from tissuejax.recordings.plausible import refuse_unusable, slips
+from tissuejax.recordings.plausible import refuse_gaps, refuse_unusable, slips
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 N = 200
@@ -98,6 +98,13 @@ def test_what_can_not_be_fitted_is_refused(case):
     recordings, words = UNUSABLE[case]
     with pytest.raises(InputError, match=words):
         refuse_unusable(sample(**recordings), recordings)
+
+
+def test_lost_samples_hide_nothing_else_and_are_refused_where_all_are_needed():
+    lost = np.where(np.arange(N) == 7, np.nan, np.minimum(STRESS, 0.8 * np.max(STRESS)))
+    assert "sensor was at its end" in said(stretch=STRETCH, stress=lost)
+    with pytest.raises(InputError, match=f"1 of {N} samples of nominal_stress are not finite"):
+        refuse_gaps(sample(r=recording(STRETCH, lost)), ("r",))
 
 
 def test_a_dead_sensor_stops_fit_and_diagnosis(tmp_path, capsys):

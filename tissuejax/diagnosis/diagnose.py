@@ -37,7 +37,7 @@ from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.catalogue import experiment
 from tissuejax.progress import Progress, Silent
 from tissuejax.recordings.files import read
-from tissuejax.recordings.plausible import refuse_unusable, slips
+from tissuejax.recordings.plausible import refuse_gaps, refuse_unusable, slips
 from tissuejax.recordings.recording import Sample
 from tissuejax.storage import write_json
 
@@ -75,7 +75,8 @@ def diagnose(
     keep_programs()
     sample = source if isinstance(source, Sample) else read(source)
     fitted, held_out, remarks = split(sample, holdout)
-    refuse_unusable(sample, fitted)
+    refuse_unusable(sample, (*fitted, *held_out))
+    refuse_gaps(sample, (*fitted, *held_out))
     for name in effects or ():
         known = (*all_effects(), SCATTER.name, HYSTERESIS.name)
         if name not in known:

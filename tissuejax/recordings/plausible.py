@@ -1,7 +1,8 @@
 """Plausibility at the door: what looks like a slip of unit, sign or sensor, with the likely slip named.
 
 `slips` are sentences: nothing is refused for being unusual. `refuse_unusable` stops a fit or a diagnosis where a
-channel holds nothing that could be fitted; reading and looking stay possible.
+channel holds nothing that could be fitted, `refuse_gaps` a diagnosis where samples are lost; reading and looking stay
+possible.
 """
 
 from collections.abc import Iterable
@@ -72,6 +73,22 @@ def refuse_unusable(sample: Sample, names: Iterable[str]) -> None:
             f"recording {zero[0]}: noise_std is 0 while other recordings have noise: it would weigh infinitely; give "
             "its noise level, leave it out of the file, or fit with --weights uniform"
         )
+
+
+def refuse_gaps(sample: Sample, names: Iterable[str]) -> None:
+    """Refuse values that are not finite, where nothing can be asked of the rest; markers may be lost.
+
+    Raises:
+        InputError: which channel of which recording, and how many samples.
+    """
+    for name in names:
+        for key, channel in sample.recordings[name].channels.items():
+            values = np.asarray(channel.values, float).reshape(len(channel.values), -1)
+            if key != "markers" and (lost := int(np.sum(~np.all(np.isfinite(values), axis=1)))):
+                raise InputError(
+                    f"recording {name}: {lost} of {len(values)} samples of {key} are not finite; leave these samples "
+                    "out, or the recording"
+                )
 
 
 def _drive(recording: Recording) -> Float[np.ndarray, " n"] | None:
@@ -172,7 +189,11 @@ def _dead(recording: Recording) -> list[str]:
 
 def _saturated(recording: Recording) -> list[str]:
     drive, load = _drive(recording), _load(recording)
-    if drive is None or load is None or len(load) < 4 * RUN or not np.ptp(load) or not np.ptp(drive):
+    if drive is None or load is None:
+        return []
+    seen = np.isfinite(load)
+    drive, load = drive[seen], load[seen]
+    if len(load) < 4 * RUN or not np.ptp(load) or not np.ptp(drive):
         return []
     for value, word in ((load.max(), "largest"), (load.min(), "smallest")):
         at = np.concatenate([[0], (load == value).astype(int), [0]])

@@ -19,7 +19,7 @@ from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.judge import log_prior
 from tissuejax.diagnosis.judgement.marginal import Blocked
-from tissuejax.diagnosis.judgement.weigh import Scales, Weighed, weigh
+from tissuejax.diagnosis.judgement.weigh import Scales, Weighed, squared, weigh
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.score import Score, complement, gain, trusted
 from tissuejax.diagnosis.starts import distinct, inside
@@ -167,15 +167,16 @@ class Exploration:
             basis = complement(whitening.whiten(jac, bench.fitted))
             r = whitening.residual(prediction, bench.fitted)
             r = r - basis @ (basis.T @ r)
-            white = whitening.whiten(columns, bench.fitted)
-            white = white - basis @ (basis.T @ white)
+            with np.errstate(over="ignore", invalid="ignore"):  # a column may be beyond all numbers: no trial of it
+                white = whitening.whiten(columns, bench.fitted)
+                white = white - basis @ (basis.T @ white)
             column = 0
             for c, grid in zip(left, grids, strict=True):
                 trials, k = [], len(c.amplitudes)
                 for s in grid:
                     block, raw = white[:, column : column + k], columns[:, column : column + k]
                     column += k
-                    if np.all(np.isfinite(block)):
+                    if np.isfinite(squared(block)) and np.isfinite(squared(raw)):
                         trials.append(self._trial(c, s, values, r, block, raw))
                 trials = sorted(trials, key=lambda t: -t[0])
                 if trials and (c.key not in found or trials[0][0] > found[c.key].gain):

@@ -33,6 +33,7 @@ from tissuejax.estimation.discrepancy import Discrepancy, Part
 
 ROUNDS = 4  # of fit and amplitudes in turn
 SETTLED = 0.1  # nats: a round that gains less is the last
+NOTHING = 1e-12  # of the peak: a change of the stress that is rounding
 
 
 @dataclass
@@ -67,15 +68,23 @@ class Scales:
         return np.array([wide.get(f, criteria.shares[f]) for f in self.families])
 
     def effect_size(self, candidate: Candidate, values: Mapping[str, float], criteria: Criteria) -> dict[str, float]:
-        """For every amplitude of a candidate, the value that changes the stress by `change` of it, to first order."""
+        """For every amplitude of a candidate, the value that changes the stress by `change` of it, to first order.
+
+        Of an amplitude that does nothing at these shapes (fibres that nothing stretches) it is taken at those scanned;
+        of one that does nothing there either, its typical value: its prior has to be a density, whatever its width.
+        """
         shapes = {p: values[p] for p in candidate.shapes if p in values}
-        columns = self.cut.mean(self.bench.columns(self.values, [(shapes, a) for a in candidate.amplitudes]))
-        out = {}
-        for a, c in zip(candidate.amplitudes, columns.T, strict=True):  # over what it acts on: its own recording, say
-            moved = float(np.sum(c**2))
-            stress = float(np.sum(self.reference[c != 0] ** 2))
-            out[a] = criteria.change * math.sqrt(stress / moved) if np.isfinite(moved) and moved > 0 else math.inf
-        return out
+        out: dict[str, float] = {}
+        for setting in ({}, *candidate.grid):
+            left = [a for a in candidate.amplitudes if a not in out]
+            if not left:
+                break
+            columns = self.cut.mean(self.bench.columns(self.values, [({**shapes, **setting}, a) for a in left]))
+            for a, c in zip(left, columns.T, strict=True):  # over what it acts on: its own recording, say
+                moved, stress = squared(c), squared(self.reference[c != 0])
+                if 0 < moved < math.inf and stress > 0:
+                    out[a] = criteria.change * math.sqrt(stress / moved)
+        return {a: out.get(a, self.bench.free[a].scale) for a in candidate.amplitudes}
 
 
 @dataclass(frozen=True)
@@ -106,8 +115,7 @@ def with_priors(
         sizes = scales.effect_size(c, {**bench.start, **start}, criteria)
         middle = {p: [g[p] for g in c.grid if p in g] for p in c.shapes}
         for path in c.amplitudes:
-            if np.isfinite(sizes[path]):
-                priors[path] = (bench.start[path], sizes[path])
+            priors[path] = (bench.start[path], sizes[path])
         for path in c.shapes:
             f, scanned = free[path], middle[path] or [bench.start[path]]
             if f.log:
@@ -132,6 +140,12 @@ def log_prior(f: Free, at: float, prior: tuple[float, float]) -> float:
         a, b = -b, -a
     inside = log_ndtr(b) + math.log1p(-math.exp(min(log_ndtr(a) - log_ndtr(b), -1e-12)))
     return -0.5 * ((at - mean) / std) ** 2 - math.log(std * math.sqrt(2 * math.pi)) - inside
+
+
+def squared(x: Float[np.ndarray, "..."]) -> float:
+    """Sum of squares; infinite, or not a number, where something is out of all bounds."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(np.sum(x**2))
 
 
 def resting(slope: float, curvature: float) -> float:
@@ -182,13 +196,18 @@ def weigh(
         bound = (x - descent.low < 1e-6 * span) | (descent.high - x < 1e-6 * span)
         raw = scales.cut.mean(bench.jacobian(fit.values, descent.paths, names))
         jac = raw * np.where(descent.log, [fit.values[p] for p in descent.paths], 1.0)
+        if not np.isfinite(squared(jac / scales.blocked.sigma[:, None])):
+            break  # a prediction without a slope, or with one beyond all numbers: no density is to be had there
         residual, parts = y - scales.cut.mean(fit.prediction), scales.about(fit.prediction)
         prior = [priors.get(p) for p in descent.paths]
         weak = np.array([0.0 if p is None else p[1] ** -2 for p in prior])
         offset = np.array([0.0 if p is None else a - p[0] for a, p in zip(x, prior, strict=True)])
-        linear = Linear(residual, jac[:, ~bound], offset[~bound], weak[~bound])
+        # what nothing is known of, neither from the data nor before, has no density and is left alone
+        dead = np.max(np.abs(jac), axis=0, initial=0.0) * descent.scale <= NOTHING * scales.peak
+        inner = ~bound & ~(dead & (weak == 0))
+        linear = Linear(residual, jac[:, inner], offset[inner], weak[inner])
         v, m = amplitudes(linear, parts, widths, scales.blocked, v)
-        value = m.value + 0.5 * int(np.sum(~bound)) * math.log(2 * math.pi)
+        value = m.value + 0.5 * int(np.sum(inner)) * math.log(2 * math.pi)
         value += sum(
             log_prior(bench.free[p], a, q) + 0.5 * w * o * o
             for p, a, q, w, o in zip(descent.paths, x, prior, weak, offset, strict=True)
@@ -260,7 +279,11 @@ def _described(scales: Scales, keys: Sequence[str], label: str, best: tuple) -> 
     base = max(float(before @ before) - n, 1e-9)
     whitened = Whitening(bench, scales.cut, scales.blocked, parts, v).residual(fit.prediction, bench.fitted)
     at_bound = tuple(p for p, b in zip(descent.paths, bound, strict=True) if b)
-    void = any(_resting(bench.candidates[k], fit, bench, at_bound, v, scales.families) for k in keys)
+    void = any(
+        _resting(bench.candidates[k], fit, bench, at_bound, v, scales.families)
+        or _idle(bench.candidates[k], fit, bench, scales.peak)
+        for k in keys
+    )
     own = 0.5 * float(np.linalg.slogdet(m.precision)[1]) if len(m.precision) else 0.0
     density = m.value + own  # what is left of the evidence when the parameters' width is taken out of it
     evidence = SetEvidence(
@@ -290,6 +313,14 @@ def _resting(c: Candidate, fit: Refit, bench: Bench, at_bound: Sequence[str], v:
         return not any(x > 0 for f, x in zip(families, v, strict=True) if f in c.widens)
     near = (abs(fit.values[p] - bench.start[p]) <= 1e-6 * bench.free[p].scale for p in c.amplitudes)
     return all(p in at_bound and n for p, n in zip(c.amplitudes, near, strict=True))
+
+
+def _idle(c: Candidate, fit: Refit, bench: Bench, peak: float) -> bool:
+    """Whether the fit predicts the same without a candidate: it may do something, and does nothing here."""
+    if not c.amplitudes:
+        return False
+    without = bench.predict({**fit.values, **{p: bench.start[p] for p in c.amplitudes}})
+    return bool(np.max(np.abs(without - fit.prediction)) <= NOTHING * peak)
 
 
 def _rest(scales: Scales, parts: Sequence[Part], v: Float[np.ndarray, " K"], residual: Float[np.ndarray, " M"]):

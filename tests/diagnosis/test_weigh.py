@@ -1,0 +1,90 @@
+"""Sets whose model does nothing, or can't be predicted, are void: no verdict rests on them and nothing stops."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from spring_bench import FREE, START, Spring, spring
+
+from tissuejax.diagnosis.bench import Candidate, Free
+from tissuejax.diagnosis.judgement.blocks import blocks, series
+from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.explore import Effort, Exploration, scaled
+from tissuejax.diagnosis.judgement.weigh import weigh
+
+FIBRES = Candidate("fibres", ("fibre.k",), ("fibre.onset",), ({"fibre.onset": 5.0},))
+MORE = {"fibre.k": Free(0, np.inf, 10), "fibre.onset": Free(0.01, 100, 1, log=True), "base.k": Free(0, np.inf, 1)}
+
+
+class Fibred(Spring):
+    """The spring with fibres that bear beyond `onset`, and a parameter of the base that does nothing in these tests."""
+
+    most = np.inf
+
+    def predict(self, values, recordings=None):
+        v = {**self.start, **dict(values)}
+        x = np.concatenate([s.drive for s in self.segments])
+        added = v["fibre.k"] * np.maximum(x - v["fibre.onset"], 0.0)
+        bad = np.where(v["form.c"] > self.most, np.inf, 0.0)
+        return super().predict(values) + added + v["base.k"] * np.maximum(x - 2, 0) + bad
+
+
+@pytest.fixture
+def bench():
+    made = spring({"relax.g": 0.3}, sigma=0.02, held_out=())
+    return Fibred(
+        [replace(s, drive_name="shear") for s in made.segments],
+        made.y,
+        made.sigma,
+        made.fitted,
+        (),
+        made.base,
+        FREE | MORE,
+        START | {"fibre.k": 0.0, "fibre.onset": 5.0, "base.k": 1.0},
+        {**made.candidates, "fibres": FIBRES},
+    )
+
+
+def scales(bench):
+    cut, start = blocks(bench), {p: bench.start[p] for p in bench.base}
+    modes = dict.fromkeys(bench.fitted, "shear")
+    out = scaled(bench, cut, series(bench, cut, modes), bench.y, start)
+    base = weigh(out, (), start, Criteria())
+    out.values, out.reference = base.refit.values, cut.mean(base.refit.prediction)
+    return out, base
+
+
+def test_fibres_that_nothing_stretches_are_void(bench):
+    on, base = scales(bench)
+    found = weigh(on, ("fibres",), {**base.refit.values, "fibre.k": 12.0}, Criteria())
+    assert found.evidence.void
+    assert np.isfinite(found.evidence.log_evidence)
+    # all that they add is a prior that the data say nothing of: its mass is one, and the evidence is the base's
+    assert found.evidence.log_evidence == pytest.approx(base.evidence.log_evidence, abs=0.1)
+
+
+def test_where_fibres_bear_at_a_shape_scanned_they_have_the_size_of_that(bench):
+    bench.candidates["fibres"] = replace(FIBRES, grid=({"fibre.onset": 0.1},))
+    on, _ = scales(bench)
+    at = on.effect_size(bench.candidates["fibres"], {"fibre.onset": 5.0}, Criteria())
+    assert at == on.effect_size(bench.candidates["fibres"], {"fibre.onset": 0.1}, Criteria())
+
+
+def test_a_parameter_of_the_base_that_does_nothing_is_left_alone(bench):
+    _, base = scales(bench)
+    bench.base = (*bench.base, "base.k")
+    _, more = scales(bench)
+    assert more.evidence.log_evidence == pytest.approx(base.evidence.log_evidence, abs=0.1)
+    assert more.refit.values["base.k"] == 1.0
+
+
+def test_a_set_that_can_not_be_predicted_is_void_and_not_ranked(bench):
+    on, base = scales(bench)
+    bench.most = -1.0
+    found = weigh(on, ("form",), base.refit.values, Criteria())
+    assert found.evidence.void
+    assert found.evidence.log_evidence == -np.inf
+    e = Exploration(bench, Criteria(), Effort(), on)
+    e.weighed = {frozenset(): base, frozenset({"form"}): found}
+    assert e.ranked(1) == []
+    assert e.best == frozenset()
