@@ -22,9 +22,11 @@ def test_steady_force_is_toughness_plus_wedging(half_millimetre):
 
 
 def test_work_is_accounted_for_in_every_frame(half_millimetre):
+    """All terms at one time: what is left over is of the second order in the step. Counted half a step apart (works up
+    to the last speed, energies at the last place) it is half a step's work, 0.5 % where the work has just begun."""
     _, out = half_millimetre
     late = np.asarray(out.balance.work) > 0.05 * float(out.balance.work[-1])
-    assert np.abs(np.asarray(out.balance.error))[late].max() < 0.005
+    assert np.abs(np.asarray(out.balance.error))[late].max() < 0.0005
 
 
 def test_energy_lost_per_area_is_the_toughness(half_millimetre):

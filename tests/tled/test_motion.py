@@ -11,7 +11,7 @@ import pytest
 from tests.tled import cases
 from tissuejax.errors import InputError, UnstableSimulation
 from tissuejax.mesh.columns import box
-from tissuejax.tled import contact, stream
+from tissuejax.tled import contact, internal, ledger, stream
 from tissuejax.tled.simulate import compiled, run
 from tissuejax.tled.step import machine
 
@@ -38,14 +38,26 @@ def test_force_on_probe_and_support_agree_to_the_change_of_momentum(pressed):
 
 
 def test_the_work_of_the_probe_is_found_again_as_energy(pressed):
-    """Kinetic, strain, hourglass and penalty energy at the end = work of the probe, to 0.3 % (less at shorter steps:
-    the velocity is half a step behind)."""
+    """Kinetic, strain, hourglass and penalty energy = work of the probe, all at the time of the last speeds, half a
+    step before the end: what is missing is of the second order in the step (the static mass of contact, which belongs
+    to the body whose motion is followed, stays as it is), and a thousandth at 24 steps a frame."""
     scene, out = pressed
-    end = jnp.stack([jnp.interp(out.end_time[-1], scene.probe.time, scene.probe.position[:, i]) for i in range(3)])
-    penalty = contact.energy(scene.probe, contact.patch(scene), out.state.u, end)
-    stored = float(out.checks.kinetic[-1] + out.checks.internal[-1] + out.checks.hourglass[-1] + penalty)
-    assert abs(stored / float(out.work[-1]) - 1) < 3e-3
-    assert float(out.depth) < 0.04 * cases.RADIUS  # facets as large as the ball: 1.8e-4 m at this pace
+    coarse = scene.put({"clock.steps": scene.clock.steps // 2})
+    missing = _missing(scene, out)
+    assert abs(missing) < 1e-3
+    assert 3 < _missing(coarse, run(coarse)) / missing < 5
+
+
+def _missing(scene, out):
+    """Share of the probe's work that is not found again."""
+    m = machine(scene)
+    u = ledger.midway(m, out.state)
+    when = out.end_time[-1] - 0.5 * scene.clock.step * scene.clock.compression
+    centre = jnp.stack([jnp.interp(when, scene.probe.time, scene.probe.position[:, i]) for i in range(3)])
+    elastic, _, hourglass = internal.internal_energy(scene, m.mesh, u)
+    kinetic = 0.5 * jnp.sum(m.mass * out.state.v**2)
+    stored = elastic + hourglass + kinetic + contact.energy(scene.probe, m.patch, u, centre)
+    return float(1 - stored / out.work[-1])
 
 
 def test_a_free_fall_of_the_whole_body_is_exact():
@@ -79,7 +91,7 @@ def test_a_step_above_the_critical_one_is_refused_and_one_forced_in_is_caught():
         cases.plain(g, times, step=0.01)
     wild = cases.plain(g, times, gravity=(0, 0, -9.81)).put({"clock.steps": 5})
     with pytest.raises(UnstableSimulation, match=r"broke down by t = .* element \d+"):
-        run(wild)
+        run(wild, halvings=0)
 
 
 def test_a_burst_names_the_element_in_which_it_began():
@@ -90,7 +102,7 @@ def test_a_burst_names_the_element_in_which_it_began():
     middle = 62
     field = jnp.ones(len(g.cells)).at[middle].set(12.0)
     with pytest.raises(UnstableSimulation, match=r"broke down by t = .* element \d+ near .* smaller step") as caught:
-        run(scene.put({"tissue.stiffness": field}))
+        run(scene.put({"tissue.stiffness": field}), halvings=0)
     named = int(str(caught.value).split("element ")[1].split()[0])
     assert np.isin(g.cells[named], g.cells[middle]).any()  # the element itself or one that touches it
 

@@ -76,7 +76,7 @@ class Outcome(eqx.Module):
         failed: -1, or the frame by whose end the run had failed; `element`: where (inverted, or at the node that moved
             fastest when all was last finite).
         state: the final state, to go on from.
-        balance: energies and crack at the end of each frame, with cohesive faces; else None.
+        balance: energies and crack half a step before the end of each frame, with cohesive faces; else None.
         penetration: greatest penetration of the surface into the probe at the end of each frame, m (-inf: none).
     """
 
@@ -144,7 +144,7 @@ def proceed(m: Machine, state: State) -> Outcome:
         mean = Felt(*(x / clock.steps for x in total[:3]), total.work, total.spent)
         looked = None
         if scene.faces is not None:
-            looked = look(m, state, None if drive.centre is None else drive.centre[-1] + drive.stride[-1])
+            looked = look(m, state, None if drive.centre is None else drive.centre[-1] + 0.5 * drive.stride[-1])
         return state, (mean, _markers(scene, state.u), _pace(m, state, drive), looked)
 
     def block(state, drive):

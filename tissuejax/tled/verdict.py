@@ -7,6 +7,7 @@ import numpy as np
 from tissuejax.errors import UnstableSimulation
 from tissuejax.tled import contact
 from tissuejax.tled.scene import Scene
+from tissuejax.tled.stable import critical_steps
 
 if TYPE_CHECKING:
     from tissuejax.tled.simulate import Outcome
@@ -26,7 +27,12 @@ def halved(scene: Scene) -> Scene:
 
 def shorter_helps(out: "Outcome", scene: Scene) -> bool:
     """Whether a shorter step may cure the breakdown: not where gravity crushes a support."""
-    return _under_probe(int(out.element), scene) or scene.gravity is None
+    return _under_probe(int(out.element), scene) or scene.gravity is None or _too_long(scene)
+
+
+def _too_long(scene: Scene) -> bool:
+    """Whether the step is above the critical one at rest: a parameter has grown since it was chosen."""
+    return float(scene.clock.step) > float(np.min(critical_steps(scene)))
 
 
 def check(out: "Outcome", scene: Scene) -> None:
@@ -56,6 +62,12 @@ def _broken(out, scene) -> str:
             "Where a blade enters soft tissue the first elements fold: take tissue that resists compression (K ten "
             "times the shear modulus or more), other elements there, a strength that the mesh can carry and that parts "
             "within the blade's thickness (`tissuejax cut resolve`), or begin in a short notch"
+        )
+    if _too_long(scene):
+        critical = np.asarray(critical_steps(scene))
+        return told + (
+            f"The step is above the critical one, {1e3 * critical.min():.3g} ms in element {int(critical.argmin())}: "
+            "take a smaller step (stiffer parameters need one)"
         )
     if _under_probe(element, scene):
         return told + (
