@@ -167,7 +167,8 @@ def diagnose(
     Args:
         data: a recording file or a Sample.
         energy: base model, by name.
-        holdout: recordings that take no part in any fit; the last one by default.
+        holdout: recordings to predict from a fit to the others; the last one by default. Of material tests they have a
+            say in which set of effects is chosen.
         options: `effects` to try, `ogden_form`, `progress`, `budget`.
     """
     from tissuejax.diagnosis.diagnose import diagnose as run

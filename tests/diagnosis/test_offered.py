@@ -4,9 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import PchipInterpolator
 
 from tissuejax.diagnosis.bench import Candidate
-from tissuejax.diagnosis.offered import Protocol, offered
+from tissuejax.diagnosis.offered import LACKING, Protocol, needs, offered
+from tissuejax.effects.catalogue import effects
+from tissuejax.energies.catalogue import energy
+from tissuejax.experiments.catalogue import experiment
+from tissuejax.model import Model
 from tissuejax.recordings.recording import Channel, Recording, Sample
 from tissuejax.recordings.specimens import NO_TIME
 
@@ -27,6 +32,11 @@ def sample(*stretches, kind="uniaxial", **attributes):
     return Sample("s", made)
 
 
+def stresses(model, values, stretch):
+    (recording,) = sample(stretch).recordings.values()
+    return np.asarray(experiment("uniaxial").predict(model, values, recording).channels["nominal_stress"].values)
+
+
 def names(*stretches, **more):
     kept, _ = offered(sample(*stretches, **more), CANDIDATES)
     return {c.name for c in kept.values()}
@@ -42,6 +52,31 @@ def names(*stretches, **more):
 )
 def test_memory_needs_a_hold_or_a_way_back(stretch, seen):
     assert names(stretch) & {"viscoelasticity", "softening", "permanent-set", "hysteresis"} == seen
+
+
+def test_what_remembers_the_way_is_a_strain_energy_until_it_comes_back():
+    """Set and softening against a law of strain alone: alike on a ramp at any rate, unlike on the way back."""
+    on = [e for e in effects("homogeneous").values() if e.needs == "reversed"]
+    assert {e.name for e in on} >= {"permanent-set", "softening"}
+    for kind in on:
+        added = kind()
+        first = {a: 0.3 for a in added.amplitudes} | ({"m": 50.0} if "m" in added.neutral else {})
+        model = Model(energy("neo-hookean")).with_effects(added)
+        values = {"energy.mu": 1000.0} | {f"effects.{added.name}.{k}": v for k, v in first.items()}
+        stress = [stresses(model, values, x) for x in (RAMP, 1 + (RAMP - 1) ** 2 / 0.3, CYCLE)]
+        law = PchipInterpolator(RAMP, stress[0])
+        up = TIME <= 10
+        size = np.max(np.abs(stress[0]))
+        assert np.max(np.abs(stress[1] - law(1 + (RAMP - 1) ** 2 / 0.3))) < 1e-4 * size
+        assert np.max(np.abs(stress[2] - law(CYCLE))[up]) < 1e-4 * size
+        assert np.max(np.abs(stress[2] - law(CYCLE))[~up]) > 1e-2 * size
+
+
+def test_every_need_is_a_property_of_a_protocol_and_has_words():
+    protocol = Protocol.of(sample(RAMP))
+    for need in needs().values():
+        assert isinstance(getattr(protocol, need), bool)
+        assert LACKING[need]
 
 
 def test_noise_on_the_stretch_is_no_unloading():

@@ -31,16 +31,17 @@ The base model is fitted; every effect of the catalogue, of tissue, rig and sens
 material tests, sets of effects are compared by their evidence beside what any law leaves of real recordings; of
 probings by a criterion with the noise. The verdict is one of: nothing-missing; found; found-in-part (names, and a rest
 that is stated); ambiguous (one of these, and the experiment that would tell); or unexplained (something is missing that
-no effect of the catalogue accounts for). Nothing is fitted to a held-out recording of a material test: its errors are
-those of a prediction, though it has a say in which effects are chosen.
+no effect of the catalogue accounts for). All recordings of material tests, those held out too, choose the set of
+effects; the parameters and the errors shown come from a fit to the others, with nothing fitted to those held out.
 
   tissuejax diagnose liver.h5 --energy reduced-polynomial-2 --out out/liver
   tissuejax diagnose muscle.toml --energy neo-hookean --holdout slow --holdout fast
   tissuejax diagnose rubber.toml --energy ogden-3 --ogden-form mu/alpha --effect viscoelasticity --effect softening
 
 What is written into --out: result.json (every number), report.html (one page to read and keep), remainder.json (what is
-still left, as smooth functions of drive, rate, time and place) and the figures as PNG. Probings take minutes; one that
-was stopped goes on where it was when the same command is given again.
+still left, as smooth functions of drive, rate, time and place), evidence.json of material tests (every set weighed) and
+the figures as PNG. Probings take minutes; one that was stopped goes on where it was when the same command is given
+again. Material tests and cuts begin anew.
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
@@ -49,7 +50,7 @@ was stopped goes on where it was when the same command is given again.
         parser.add_argument("--energy", required=True, metavar="NAME", help="base model: a strain energy by name")
         parser.add_argument("--ogden-form", metavar="FORM", help="for ogden-N: which form the constants mean")
         parser.add_argument(
-            "--holdout", action="append", metavar="NAME", help="recording to hold out (repeat); default: the last one"
+            "--holdout", action="append", metavar="NAME", help="recording to predict (repeat); default: the last one"
         )
         parser.add_argument(
             "--only", action="append", default=[], metavar="NAME", help="diagnose this recording (repeat for more)"

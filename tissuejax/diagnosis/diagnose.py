@@ -58,13 +58,15 @@ def diagnose(
     Args:
         source: a recording file or a sample.
         energy: base model, by its name on the command line.
-        holdout: recordings that take no part in any fit; the last one by default, none if there is only one.
+        holdout: recordings to predict; the last one by default, none if there is only one. All parameters and errors
+            shown come from a fit to the other recordings. Of material tests all recordings, these too, choose the set
+            of effects; of probings and cuts only what is a recording's own (an offset, a phase) is fitted to these.
         out: folder for `result.json` and the unexplained remainder; nothing is written by default.
         effects: names of the effects to try; all that can act by default.
         ogden_form: for `ogden-N`.
         budget: how much the search may spend.
-        keep: folder in which a stopped diagnosis finds again what it had finished (simulations of probings, refits of
-            material tests; removed at the end); inside `out` by default.
+        keep: folder in which a stopped diagnosis of probings finds its finished simulations again (removed at the end);
+            inside `out` by default. Other diagnoses begin anew.
 
     Raises:
         InputError: a file that can't be read, an unknown recording or effect, fewer samples than parameters.

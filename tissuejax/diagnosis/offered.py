@@ -1,16 +1,18 @@
-"""Which candidates these recordings can speak of: none that its own page (`Effect.blind`) calls them blind to.
+"""Which candidates these recordings can speak of: none that needs what their protocol hasn't done.
 
-What a protocol can't show must not be named from it: whatever is then fitted bends to something else. Asked of the
-protocol alone, before anything is fitted; a clock is needed by all that acts in time (`untimed`).
+What a protocol can't show must not be named from it: whatever is then fitted bends to something else. Every effect
+says what it needs (`Effect.needs`), a property of the protocol, which is asked of the protocol alone, before anything
+is fitted; a clock is needed by all that acts in time (`untimed`).
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from tissuejax.diagnosis.bench import Candidate
 from tissuejax.diagnosis.untimed import timed, without_clock
+from tissuejax.effects.catalogue import effects
 from tissuejax.recordings.recording import Recording, Sample
 
 SCATTER = Candidate("specimen-scatter", (), widens={"gain": 0.3})
@@ -27,13 +29,17 @@ class Protocol:
 
     Attributes:
         kinds: of experiments.
-        reversed: some recording unloads.
+        reversed: some recording comes back over strains that it has passed. Before that the stress is a function of
+            strain for whatever remembers the way (set, softening, hysteresis), so it is another strain energy.
         rates: some recording holds or unloads, or recordings differ in rate.
         times: recordings begin at different times of the session.
         directions: specimens are loaded along several directions.
         sides: pulled and pressed.
         sizes: specimens differ in size.
         several: there are several recordings.
+
+    Derived: `constraints` (some test holds what a change of volume would move), `unlike` (specimens or modes that the
+    same rig loads unlike).
     """
 
     kinds: frozenset[str]
@@ -44,6 +50,16 @@ class Protocol:
     sides: bool
     sizes: bool
     several: bool
+
+    @property
+    def constraints(self) -> bool:
+        """Whether some test is neither uniaxial nor simple shear."""
+        return not self.kinds <= {"uniaxial", "simple-shear"}
+
+    @property
+    def unlike(self) -> bool:
+        """Whether modes, senses or sizes differ."""
+        return len(self.kinds) > 1 or self.sides or self.sizes
 
     @classmethod
     def of(cls, sample: Sample) -> "Protocol":
@@ -91,23 +107,21 @@ def motion(time: np.ndarray, x: np.ndarray) -> tuple[bool, float, bool]:
     return turns, quick, still > HELD * float(np.ptp(time))
 
 
-NEEDS: Mapping[str, tuple[Callable[[Protocol], bool], str]] = {
-    "aging": (lambda p: p.times, "recordings carry no times of their own in the session (`start`)"),
-    "anisotropy": (lambda p: p.directions, "all recordings load one direction"),
-    "compressibility": (
-        lambda p: not p.kinds <= {"uniaxial", "simple-shear"},
-        "uniaxial and shear tests alone don't show a change of volume",
-    ),
-    "machine-compliance": (
-        lambda p: len(p.kinds) > 1 or p.sides or p.sizes,
-        "one specimen in one mode can't tell the rig's compliance from the tissue's",
-    ),
-    "permanent-set": (lambda p: p.reversed, "nothing is unloaded"),
-    "softening": (lambda p: p.reversed, "nothing is unloaded"),
-    "hysteresis": (lambda p: p.reversed, "nothing is unloaded"),
-    "viscoelasticity": (lambda p: p.rates, "ramps at one rate, without holds"),
-    "specimen-scatter": (lambda p: p.several, "there is one recording"),
+LACKING: Mapping[str, str] = {  # property of a protocol: what is said where it is not there
+    "times": "recordings carry no times of their own in the session (`start`)",
+    "directions": "all recordings load one direction",
+    "constraints": "uniaxial and shear tests alone don't show a change of volume",
+    "unlike": "one specimen in one mode can't tell the rig's compliance from the tissue's",
+    "reversed": "nothing is unloaded",
+    "rates": "ramps at one rate, without holds",
+    "several": "there is one recording",
 }
+
+
+def needs() -> dict[str, str]:
+    """By name, the property of a protocol that an answer needs; what needs none is not in it."""
+    declared = {name: effect.needs for name, effect in effects("homogeneous").items() if effect.needs}
+    return declared | {SCATTER.name: "several", HYSTERESIS.name: "reversed"}
 
 
 def offered(
@@ -130,10 +144,10 @@ def offered(
         if names is None or own.name in names:
             kept[own.key] = own
     protocol, why = Protocol.of(sample), {}
-    for name, (shown, reason) in NEEDS.items():
-        if any(c.name == name for c in kept.values()) and not shown(protocol):
+    for name, need in sorted(needs().items()):
+        if any(c.name == name for c in kept.values()) and not getattr(protocol, need):
             kept = {k: c for k, c in kept.items() if c.name != name}
-            why.setdefault(reason, []).append(name)
+            why.setdefault(LACKING[need], []).append(name)
     remarks += [
         f"{', '.join(left)} can't be told from these recordings and was not tried: {r}" for r, left in why.items()
     ]

@@ -32,6 +32,7 @@ class Compressibility(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
     reveals: ClassVar[str] = "disagreement between tests of unlike constraint, relaxation that is absent in shear"
     blind: ClassVar[str] = "simple shear; uniaxial tests alone"
+    needs: ClassVar[str] = "constraints"
     source: ClassVar[str] = "Mow et al. 1980; Holzapfel 2000, sec. 6.4"
     amplitudes: ClassVar[tuple[str, ...]] = ("immediate", "drained")
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"time": (1.0, 5.0, 25.0)}

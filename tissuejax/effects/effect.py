@@ -31,6 +31,8 @@ class Effect(eqx.Module):
         kinds: which experiments it can act in, of {"homogeneous", "probing", "cutting"}.
         reveals: what in a recording shows it.
         blind: experiments (or protocols) that can't show it.
+        needs: what a protocol of material tests must do to show it, a property of `diagnosis.offered.Protocol`; "" if
+            nothing in particular. Where it is lacking the effect is another strain energy by its deeds, or nothing.
         amplitudes: parameters that are 0 at neutral; the others ("shapes") vanish with the effect.
         grid: for each shape parameter, the values that a diagnosis scans; those of a shape in Pa count in initial shear
             moduli of the base energy, so that one grid serves brain and rubber (`settings` multiplies them out).
@@ -52,6 +54,7 @@ class Effect(eqx.Module):
     blind: ClassVar[str]
     source: ClassVar[str]
     amplitudes: ClassVar[tuple[str, ...]]
+    needs: ClassVar[str] = ""
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {}
     order: ClassVar[int] = 1
     isotropic: ClassVar[bool] = True

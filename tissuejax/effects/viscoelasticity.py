@@ -38,6 +38,7 @@ class Viscoelasticity(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
     reveals: ClassVar[str] = "relaxation during holds, hysteresis, stiffness that rises with rate"
     blind: ClassVar[str] = "a single ramp at constant rate"
+    needs: ClassVar[str] = "rates"
     source: ClassVar[str] = "Fung 1993, sec. 7.6; Simo and Hughes 1998, sec. 10.3"
     order: ClassVar[int] = 2
     terms: int = 2
