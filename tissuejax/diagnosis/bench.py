@@ -73,7 +73,6 @@ class Candidate:
         amplitudes: paths that are zero at neutral.
         shapes: paths that mean nothing while the amplitudes are zero, scanned over `grid`.
         grid: settings of the shapes (and, where the effect has no derivative at zero, of amplitudes) to start from.
-        cost: relative price of a refit, for benches where a prediction is a simulation.
         form: tells candidates of one effect apart.
         held: paths that held-out recordings have for themselves (offsets, phases), fitted there.
         nominated: False for forms that are only reached from their neighbours.
@@ -86,7 +85,6 @@ class Candidate:
     amplitudes: tuple[str, ...]
     shapes: tuple[str, ...] = ()
     grid: tuple[Mapping[str, float], ...] = ({},)
-    cost: float = 1.0
     form: str = ""
     held: tuple[str, ...] = ()
     nominated: bool = True
@@ -160,11 +158,6 @@ class Bench(abc.ABC):
     def elsewhere(self, values: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
         """Other values to start from that recordings may allow as well as `values` (another direction)."""
         return ()
-
-    def told(self) -> str | None:
-        """All that a prediction depends on beside the parameters, as text (`cache.key.described`): what is kept of it
-        carries its hash. None where that can't be told in full: then nothing is kept."""
-        return None
 
     def burden(self, keys: Sequence[str]) -> int:
         """How many searches and memories a prediction with these candidates nests; sets of many are not tried."""

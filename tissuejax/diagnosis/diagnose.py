@@ -18,7 +18,6 @@ from tissuejax.diagnosis.judgement.evidence import write_evidence
 from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.judgement.judge import Kind
 from tissuejax.diagnosis.judgement.material_diagnosis import MaterialDiagnosis
-from tissuejax.diagnosis.kept_refits import KeptRefits
 from tissuejax.diagnosis.material import MaterialBench, modes
 from tissuejax.diagnosis.next_experiment import proposals, settling
 from tissuejax.diagnosis.next_probing import probing_proposals
@@ -116,7 +115,7 @@ def diagnose(
         if kind == "probing":
             found = search_probing(bench, budget, told)
         elif kind == "cutting":
-            found = search(bench, budget or Budget(), told, KeptRefits(bench, None))
+            found = search(bench, budget or Budget(), told)
         else:
             effort = Effort(most=budget.most, spend=budget.spend[-1]) if budget else Effort()
             found = answer(bench, whole, modes(whole), effort, told)

@@ -157,10 +157,6 @@ class MaterialBench(Bench):
         angles = [(2 * k + 1) * np.pi / 8 for k in range(4)]
         return [fresh | {p: a if p.endswith("angle") else 0.4 for p in paths} for a in angles]
 
-    def told(self) -> str | None:
-        """See `Bench.told`."""
-        return described((self._energy, self._entries, self._tests))
-
     def _declare(self, energy: Energy, found: list[Entry]) -> None:
         recordings = (*self.fitted, *self.held_out)
         self._energy, self._entries = energy, found

@@ -10,7 +10,6 @@ nonlinear models by Box and Hill (1967). Protocols are variations of what was do
 further, the other sign, cycles, another kind of test, another direction, a day later.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -207,10 +206,3 @@ def _jacobian(trial: MaterialBench, r: Refit) -> np.ndarray:
         if path in common:
             out[:, i] = jac[:, tuple(common).index(path)]
     return out
-
-
-def renamed(recording: Recording, name: str, values: Mapping[str, np.ndarray], noise: float) -> Recording:
-    """A protocol as a recording with (simulated or measured) stress, to be added to the sample."""
-    old = recording.channels["nominal_stress"]
-    channel = Channel(old.time, values["nominal_stress"], "Pa", noise)
-    return replace(recording, name=name, channels={"nominal_stress": channel})

@@ -16,12 +16,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tissuejax.diagnosis.bench import Bench
-from tissuejax.diagnosis.kept_refits import KeptRefits
 from tissuejax.diagnosis.misfit import Misfit, estimated, white
 from tissuejax.diagnosis.neighbours import leave_out, reshape
 from tissuejax.diagnosis.plausible import doubts, on_limit
 from tissuejax.diagnosis.quality import quality
-from tissuejax.diagnosis.refit import Refit
+from tissuejax.diagnosis.refit import Refit, refit
 from tissuejax.diagnosis.score import Score, scores
 from tissuejax.diagnosis.starts import distinct, inside
 from tissuejax.errors import NotConverged
@@ -87,17 +86,13 @@ class Search:
     refits: dict[frozenset, Refit] = field(default_factory=dict)
     scored: dict[frozenset, list[Score]] = field(default_factory=dict)
     report: Callable[[str], None] = lambda _: None
-    kept: KeptRefits | None = None
     size: float = 0
     dropped: set[frozenset] = field(default_factory=set)
     _doubts: dict[frozenset, tuple[Refit, tuple[str, ...]]] = field(default_factory=dict)
 
-    def __post_init__(self):
-        self.kept = self.kept or KeptRefits(self.bench)
-
     def refit(self, keys: Sequence[str], start: Mapping[str, float], **options) -> Refit:
-        """A refit under the present noise (`refit.refit`), found again where a stopped diagnosis left it."""
-        return self.kept.refit(self.misfit, keys, start, **options)
+        """A refit under the present noise (`refit.refit`)."""
+        return refit(self.bench, self.misfit, keys, start, **options)
 
     def doubts(self, keys: frozenset) -> tuple[str, ...]:
         """What speaks against the names in a set, whatever it explains; see `plausible`."""
@@ -273,11 +268,10 @@ def search(
     bench: Bench,
     budget: Budget | None = None,
     report: Callable[[str], None] | None = None,
-    kept: KeptRefits | None = None,
 ) -> Search:
     """Fit the base, then grow sets of candidates as the budget allows; see the module's text."""
     budget = budget or Budget()
-    s = Search(bench, white(bench), budget, report=report or (lambda _: None), kept=kept)
+    s = Search(bench, white(bench), budget, report=report or (lambda _: None))
     s.report("base model")
     first = s.refit((), {}, iterations=2 * budget.iterations, tolerance=budget.tolerance, final=bench.dear)
     if not math.isfinite(first.chi2):

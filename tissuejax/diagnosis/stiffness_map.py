@@ -15,7 +15,6 @@ from jaxtyping import Float, Int
 from tissuejax.diagnosis.locate import Located
 
 ONE_SIDED = 0.7  # share of one sign from which a map speaks of a region
-CORE = 0.5  # of the greatest density: what counts as the region
 
 
 @dataclass(frozen=True)
