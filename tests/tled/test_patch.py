@@ -7,6 +7,7 @@ import pytest
 
 from tests.tled import cases
 from tissuejax.elements.hex8 import Hex8
+from tissuejax.elements.hex8_bending import Hex8Bending
 from tissuejax.elements.tet4 import Tet4
 from tissuejax.mesh.columns import box
 from tissuejax.tled import internal, stable
@@ -27,42 +28,50 @@ def solid(scene, u):
     return internal.forces(scene, mesh, u, internal.rest(scene, mesh), 1.0)[0]
 
 
-@pytest.mark.parametrize("kind", ["hexes", "bent hexes", "bent tets"])
+BENDING = {"element_name": "hexahedron-bending"}
+
+
+@pytest.mark.parametrize("kind", ["hexes", "bent hexes", "bent tets", "bending", "bent bending"])
 def test_a_homogeneous_strain_is_an_equilibrium_of_the_inner_nodes(kind):
     """Inner forces vanish to rounding, also in hexes bent at random by 15 % of their size: their gradient is the mean
     one (taken at the centre it misses by a quarter of a percent)."""
     g = cases.bent(SIZE, COUNTS) if "bent" in kind else cases.sheared(SIZE, COUNTS)
     inner = np.setdiff1d(np.arange(len(g.points)), cases.surface_nodes(box(SIZE, COUNTS)))
-    scene = cases.plain(cases.tets(g) if "tets" in kind else g, np.arange(2.0))
+    options = BENDING if "bending" in kind else {}
+    scene = cases.plain(cases.tets(g) if "tets" in kind else g, np.arange(2.0), **options)
     f, size = balance(scene, np.asarray(g.points) @ A.T)
     assert len(inner) == 8
     assert np.abs(f[inner]).max() < 1e-12 * size
+    if "bending" in kind:
+        assert isinstance(scene.body.element, Hex8Bending)
+        return
     assert scene.body.element == (Tet4() if "tets" in kind else Hex8(straight=kind == "hexes"))
 
 
-@pytest.mark.parametrize("kind", ["hexes", "tets"])
+@pytest.mark.parametrize("kind", ["hexes", "tets", "bending"])
 def test_a_rigid_rotation_makes_no_force(kind):
-    g = cases.bent(SIZE, COUNTS)
-    g = g if kind == "hexes" else cases.tets(g)
+    g, options = cases.bent(SIZE, COUNTS), BENDING if kind == "bending" else {}
+    g = cases.tets(g) if kind == "tets" else g
     c, s = np.cos(1.1), np.sin(1.1)
     R = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]]) @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
     u = np.asarray(g.points) @ (R - np.eye(3)).T
-    f, _ = balance(cases.plain(g, np.arange(2.0)), u)
-    _, size = balance(cases.plain(g, np.arange(2.0)), u + 1e-2 * np.asarray(g.points) @ A.T)
+    f, _ = balance(cases.plain(g, np.arange(2.0), **options), u)
+    _, size = balance(cases.plain(g, np.arange(2.0), **options), u + 1e-2 * np.asarray(g.points) @ A.T)
     assert np.abs(f).max() < 1e-10 * size  # rounding: displacements are a hundred times those of the strain in `size`
 
 
-@pytest.mark.parametrize("kind", ["hexes", "tets"])
+@pytest.mark.parametrize("kind", ["hexes", "tets", "bending"])
 def test_forces_are_the_gradient_of_the_energy_and_the_tangent_is_symmetric(kind, rng):
-    """Averaged pressure included; hexes without hourglass force, whose energy is not counted."""
+    """Averaged pressure included; plain hexes without hourglass force, bending ones with it and its energy."""
     g = box((0.02, 0.02, 0.02), (2, 2, 2))
-    scene = cases.plain(g if kind == "hexes" else cases.tets(g), np.arange(2.0), order=2, hourglass=0.0)
+    options = BENDING if kind == "bending" else {"hourglass": 0.0}
+    scene = cases.plain(cases.tets(g) if kind == "tets" else g, np.arange(2.0), order=2, **options)
     u, w = 1e-3 * jnp.asarray(rng.normal(size=(2, 3, len(g.points))))
 
     @jax.jit
     def everything(u, w):
         mesh = internal.mesh(scene)
-        slope = jax.grad(lambda u: internal.internal_energy(scene, mesh, u)[0])(u)
+        slope = jax.grad(lambda u: sum(internal.internal_energy(scene, mesh, u)[::2]))(u)
         force, Kw = jax.jvp(lambda u: solid(scene, u), (u,), (w,))
         return slope, force, Kw, jax.jvp(lambda u: solid(scene, u), (u,), (u,))[1]
 
@@ -71,11 +80,14 @@ def test_forces_are_the_gradient_of_the_energy_and_the_tangent_is_symmetric(kind
     assert np.isclose(jnp.vdot(u, Kw), jnp.vdot(w, Ku), rtol=1e-9)
 
 
-@pytest.mark.parametrize("kind", ["hexes", "tets", "tall", "bent"])
+@pytest.mark.parametrize("kind", ["hexes", "tets", "tall", "bent", "bending", "tall bending"])
 def test_the_critical_step_is_that_of_the_fastest_vibration(kind):
     """Largest eigenvalue of M^-1 K by power iteration on a free-topped block, against the estimate and its safety."""
-    g = {"tall": lambda: box((0.03, 0.03, 0.006), (4, 4, 4)), "bent": cases.bent}.get(kind, lambda: box(SIZE, COUNTS))()
-    scene = cases.plain(cases.tets(g) if kind == "tets" else g, np.arange(2.0))
+    g = {"tall": lambda: box((0.03, 0.03, 0.006), (4, 4, 4)), "bent": cases.bent}.get(
+        kind.split()[0], lambda: box(SIZE, COUNTS)
+    )()
+    options = BENDING if "bending" in kind else {}
+    scene = cases.plain(cases.tets(g) if kind == "tets" else g, np.arange(2.0), **options)
     mesh = jax.jit(internal.mesh)(scene)
     held = jnp.ones(len(g.points)).at[scene.body.fixed].set(0.0)
 

@@ -66,8 +66,8 @@ def _broken(out, scene) -> str:
     if _too_long(scene):
         critical = np.asarray(critical_steps(scene))
         return told + (
-            f"The step is above the critical one, {1e3 * critical.min():.3g} ms in element {int(critical.argmin())}: "
-            "take a smaller step (stiffer parameters need one)"
+            f"The step is above the critical one, {1e3 * critical.min():.3g} ms in element {int(critical.argmin())}. "
+            "Take a smaller step (stiffer parameters need one)"
         )
     if _under_probe(element, scene):
         return told + (
