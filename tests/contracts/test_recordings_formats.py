@@ -77,4 +77,5 @@ def test_remarks_tell_what_is_unusual_and_are_silent_otherwise():
         assert words in told, told
     inputs = dict(pull.inputs) | {"stretch": np.linspace(1, 2, 7)}
     plain = Recording("a", "uniaxial", inputs, pull.channels)
-    assert remarks.remarks(Sample("s", {"a": plain})) == []
+    # nothing but its length is unusual about this one
+    assert remarks.remarks(Sample("s", {"a": plain})) == ["a: 7 samples only: too few to tell a model from noise"]
