@@ -74,7 +74,7 @@ class Hex8Bending(Element):
         nu, V, a = self.poisson, reference.volume / 64, reference.length  # modes are sums over eight nodes
         young = 2 * (1 + nu) * stiffness
         plate = young / (1 - nu * nu) * V / 3
-        out = [[0.0] * 3 for _ in range(4)]
+        out: list[list[Any]] = [[0.0] * 3 for _ in range(4)]
         for t in range(3):
             i, j = (k for k in range(3) if k != t)
             ei, ej = q[MODE[i, t], i] / a[i], q[MODE[j, t], j] / a[j]

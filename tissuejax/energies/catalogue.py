@@ -122,7 +122,7 @@ def _of(found: dict[str, type], kind: str, name: str, **options):
     ordered = _ordered(cls)
     if ordered and not order:
         raise InputError(f"{kind} {name!r} needs its order, 1 or more: write {stem}-2 for order 2")
-    if ordered and order > MOST:
+    if ordered and order is not None and order > MOST:
         raise InputError(
             f"{kind} {name!r}: order {order} has more constants than any test can tell; 1 to {MOST} can be had"
         )
