@@ -60,8 +60,8 @@ class DiagnosisResiduals(Plot):
         """How to read it."""
         return (
             "Measured minus predicted, in units of the noise. Grey: base model alone. Blue (fitted) and orange (held "
-            "out, no part in any fit): with the effects of the verdict. Inside the pale band lies what noise alone "
-            "gives. The thin line is what was done to the specimen."
+            "out, not fitted for the curves shown): with the effects of the verdict. Inside the pale band lies what "
+            "noise alone gives. The thin line is what was done to the specimen."
         )
 
     def draw(self, data: list[Pair]) -> Figure:
