@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.fibre import family
 from tissuejax.energies.strain import Strain
+from tissuejax.energies.two_families import DIRECTIONS, REINFORCED, directions
 from tissuejax.parameters import Parameter
 
 
@@ -28,24 +29,7 @@ class HolzapfelGasserOgden(Energy):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return (
-            Parameter("mu", "Pa", 1000.0, lower=0.0, meaning="shear modulus of the matrix"),
-            Parameter("k1", "Pa", 1000.0, lower=0.0, meaning="stiffness of the fibres"),
-            Parameter("k2", "1", 1.0, lower=0.0, upper=1e3, meaning="stiffening of the fibres"),
-            Parameter(
-                "spread", "rad", 0.6, lower=0.0, upper=1.6, scale=1.0, meaning="half the angle between the families"
-            ),
-            Parameter(
-                "angle",
-                "rad",
-                0.0,
-                lower=-3.2,
-                upper=3.2,
-                scale=1.0,
-                meaning="direction midway, from axis 1 to 2",
-                frozen=True,
-            ),
-        )
+        return (*REINFORCED, *DIRECTIONS)
 
     def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
         fibres = sum(family(p, strain, 0.0, angle) for angle in self.angles(p))
@@ -56,4 +40,4 @@ class HolzapfelGasserOgden(Energy):
 
     def angles(self, p: Mapping[str, Array]) -> tuple[Array, ...]:
         """Direction of each family from axis 1 to 2, rad."""
-        return p["angle"] + p["spread"], p["angle"] - p["spread"]
+        return directions(p)
