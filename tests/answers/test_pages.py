@@ -5,10 +5,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 import tissuejax as tj
 from tests.specimens import ramp, recording
 from tissuejax.fitting.advice import beyond_noise, suspect
+from tissuejax.fitting.bands import fitted_std, prediction_std
 from tissuejax.recordings.recording import Channel, Recording, Sample
 from tissuejax.report import sentences
 from tissuejax.report.fit_overlay import FitOverlay
@@ -37,6 +39,27 @@ def test_the_band_is_that_of_a_line_through_the_origin(found):
     widening = max(1.0, found.chi2_per_dof)
     by_hand = 1.959964 * np.sqrt(100.0 * widening * x**2 / np.sum(x**2) + 100.0)
     np.testing.assert_allclose(FitOverlay().prepare(found)[0].band, by_hand, rtol=1e-6)
+
+
+def test_where_the_noise_was_not_recorded_the_band_is_that_of_student():
+    # 6 values, 1 parameter: the textbook's prediction interval of a line through the origin, 5 degrees of freedom.
+    few = sample(10.0).recordings["pull"]
+    time, stretch = few.inputs["time"][::10], STRETCH[::10]
+    stress = np.asarray(few.channels["nominal_stress"].values)[::10]
+    made = recording("pull", "uniaxial", time, stretch)
+    pull = Recording("pull", "uniaxial", made.inputs, {"nominal_stress": Channel(time, stress, "Pa")}, {})
+    found = tj.fit(Sample("s", {"pull": pull}), "neo-hookean", multistart=1)
+    x = stretch - stretch**-2
+    s = np.sqrt(np.sum((stress - found.values["energy.mu"] * x) ** 2) / 5)
+    by_hand = student.ppf(0.975, 5) * s * np.sqrt(1 + x**2 / np.sum(x**2))
+    np.testing.assert_allclose(FitOverlay().prepare(found)[0].band, by_hand, rtol=1e-6)
+
+
+def test_the_band_from_the_fits_own_jacobian_is_the_same(found):
+    problem, values = found.problem, found.values
+    own = fitted_std(problem, problem.linearised(values)[1], found.uncertainty)
+    again = prediction_std(problem, values, found.uncertainty, ("pull",))
+    np.testing.assert_allclose(own["pull"]["nominal_stress"], again["pull"]["nominal_stress"], rtol=1e-9, atol=1e-12)
 
 
 def test_a_noise_level_a_little_low_is_not_something_missing():

@@ -43,6 +43,7 @@ def test_the_page_tells_the_story_in_its_order(relaxing, tmp_path):
     page = write_diagnosis(relaxing, tmp_path)["page"].read_text()
     assert not re.search(r'(src|href)="(?!data:)', page), "the page points outside itself"
     told = [t.replace("&#39;", "'") for t in re.findall(r"<h2>(.*?)</h2>", page)]
+    assert page.index('alt="measured"') < page.index("<h2>"), "the first figure is what was measured"
     assert told == [
         "What the residual looks like, before and after",
         "Where the base model misses",

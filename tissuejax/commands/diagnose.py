@@ -16,6 +16,7 @@ from tissuejax.recordings.files import read
 from tissuejax.recordings.recording import Sample
 from tissuejax.report import diagnosis_sentences as sentences
 from tissuejax.report.diagnosis_page import write_diagnosis
+from tissuejax.report.headline import headline
 
 
 class DiagnoseCommand(Command):
@@ -88,9 +89,12 @@ def _only(sample: Sample, only: list[str], holdout: list[str] | None) -> Sample:
 
 def told(found: Diagnosis, written: dict[str, Path]) -> Reply:
     """The verdict as text and as the record of `--json`."""
-    lines = [found.verdict.kind, "", sentences.lead(found), ""]
+    lines = [headline(found), "", f"Verdict: {found.verdict.kind}. {sentences.lead(found)}", ""]
     lines += [f"  {r['path']:<40}{r['value']:>24} {r['unit']:<6}{r['note']}" for r in sentences.parameters(found)]
     lines += ["", *sentences.sure(found), ""]
     lines += [f"page     {written['page']}", f"numbers  {written['result']}"]
-    record = found.as_dict() | {"files": {name: str(path) for name, path in written.items()}}
+    record = found.as_dict() | {
+        "headline": headline(found),
+        "files": {name: str(path) for name, path in written.items()},
+    }
     return Reply(record, "\n".join(lines))

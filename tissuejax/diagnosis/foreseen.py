@@ -53,13 +53,11 @@ class Foreseen:
 
 def foreseen(bench: Bench, misfit: Misfit, r: Refit) -> list[Foreseen]:
     """For every held-out recording; empty where no standard errors are known."""
-    paths = tuple(p for p, s in r.std.items() if np.isfinite(s))
-    if not paths or not bench.held_out:
+    if not bench.held_out:
         return []
-    fitted = misfit.whiten(bench.jacobian(r.values, paths, bench.fitted), bench.fitted)
-    size = np.linalg.norm(fitted, axis=0)
-    _, s, v = np.linalg.svd(fitted / size, full_matrices=False)
-    half = (v.T / s) * np.sqrt(max(1.0, r.chi2 / max(r.n - r.k, 1))) / size[:, None]  # half @ half.T is C
+    paths, half = _spread(bench, misfit, r)
+    if not paths:
+        return []
     whole = bench.jacobian(r.all, (*paths, *r.own), bench.held_out)
     out = []
     for name in bench.held_out:
@@ -74,6 +72,30 @@ def foreseen(bench: Bench, misfit: Misfit, r: Refit) -> list[Foreseen]:
         unit = next(s.unit for s in bench.segments if s.recording == name)
         out.append(Foreseen(name, std, unit, over, paths[int(np.argmax(closed))]))
     return out
+
+
+def prediction_std(bench: Bench, misfit: Misfit, r: Refit) -> Float[np.ndarray, " N"]:
+    """Standard deviation of the noise-free prediction, sqrt(diag(J C J')), fitted and held out; 0 where none is known.
+
+    Args:
+        misfit: under which `r` was fitted.
+    """
+    paths, half = _spread(bench, misfit, r)
+    if not paths:
+        return np.zeros(len(bench.y))
+    moved = bench.jacobian(r.all, paths, (*bench.fitted, *bench.held_out)) @ half
+    return np.sqrt(np.sum(moved**2, axis=1))
+
+
+def _spread(bench: Bench, misfit: Misfit, r: Refit) -> tuple[tuple[str, ...], Float[np.ndarray, "k k"]]:
+    """Identified paths, and a matrix whose product with its transpose is the covariance of their estimates."""
+    paths = tuple(p for p, s in r.std.items() if np.isfinite(s))
+    if not paths:
+        return (), np.zeros((0, 0))
+    fitted = misfit.whiten(bench.jacobian(r.values, paths, bench.fitted), bench.fitted)
+    size = np.linalg.norm(fitted, axis=0)
+    _, s, v = np.linalg.svd(fitted / size, full_matrices=False)
+    return paths, (v.T / s) * np.sqrt(max(1.0, r.chi2 / max(r.n - r.k, 1))) / size[:, None]
 
 
 def without(jac: Float[np.ndarray, "n k"], own: Float[np.ndarray, "n m"]) -> Float[np.ndarray, "n k"]:

@@ -22,6 +22,7 @@ class Adhesion(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
     reveals: ClassVar[str] = "pulling force at the end of the retraction"
     blind: ClassVar[str] = "recordings without a retraction; material tests"
+    words: ClassVar[tuple[str, ...]] = ("the tissue sticks to the probe with up to {strength}",)
     source: ClassVar[str] = "cohesive traction over a gap, as in Lister 2012, 3.2.1"
     amplitudes: ClassVar[tuple[str, ...]] = ("strength",)
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"reach": (1e-4, 3e-4)}

@@ -30,6 +30,7 @@ class Anisotropy(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
     reveals: ClassVar[str] = "stiffness that differs between directions"
     blind: ClassVar[str] = "uniaxial recordings in a single direction"
+    words: ClassVar[tuple[str, ...]] = ("fibres of {k1} run at {angle} to x", "stiffening with k2 {k2}")
     needs: ClassVar[str] = "directions"
     source: ClassVar[str] = "Holzapfel, Gasser and Ogden 2000, eq. 65"
     isotropic: ClassVar[bool] = False

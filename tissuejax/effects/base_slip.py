@@ -24,6 +24,7 @@ class BaseSlip(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
     reveals: ClassVar[str] = "markers spread sideways more than a bonded base allows"
     blind: ClassVar[str] = "depths small against the thickness; material tests"
+    words: ClassVar[tuple[str, ...]] = ("the base slips by {compliance} under shear", "and creeps by {fluidity}")
     source: ClassVar[str] = "Newtonian or elastic interlayer; the source fixes the base (Lister 2012, 2.2.4)"
     amplitudes: ClassVar[tuple[str, ...]] = ("compliance", "fluidity")
 

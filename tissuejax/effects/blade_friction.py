@@ -22,6 +22,7 @@ class BladeFriction(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"cutting"})
     reveals: ClassVar[str] = "force that grows with the length in contact; force on the return stroke"
     blind: ClassVar[str] = "a short cut in one direction"
+    words: ClassVar[tuple[str, ...]] = ("the blade rubs with a coefficient of {coefficient}",)
     source: ClassVar[str] = "Spagnoli et al. 2019, Int. J. Mech. Sci. 161; Gokgol et al. 2012"
     amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
 

@@ -25,6 +25,7 @@ class Capsule(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
     reveals: ClassVar[str] = "surface dips too wide for the depth: markers far from the probe move too much"
     blind: ClassVar[str] = "force alone at one depth; material tests (the specimen is cut from inside)"
+    words: ClassVar[tuple[str, ...]] = ("a capsule of {stiffness} covers the tissue",)
     source: ClassVar[str] = "membrane of Glisson's capsule; Hollenstein et al. 2006"
     amplitudes: ClassVar[tuple[str, ...]] = ("stiffness",)
 

@@ -22,6 +22,7 @@ class ClockLag(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
     reveals: ClassVar[str] = "marker residuals proportional to marker velocity, none in holds"
     blind: ClassVar[str] = "recordings without markers; holds; material tests"
+    words: ClassVar[tuple[str, ...]] = ("the markers' clock is {lag} late",)
     source: ClassVar[str] = "Lister 2012, 2.2.1 (force at 62.5 Hz and cameras at 15 Hz on separate clocks)"
     amplitudes: ClassVar[tuple[str, ...]] = ("lag",)
     order: ClassVar[int] = 0

@@ -32,6 +32,10 @@ class Compressibility(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
     reveals: ClassVar[str] = "disagreement between tests of unlike constraint, relaxation that is absent in shear"
     blind: ClassVar[str] = "simple shear; uniaxial tests alone"
+    words: ClassVar[tuple[str, ...]] = (
+        "volume is lost at once (1/K {immediate})",
+        "volume is lost by draining (1/K {drained} in {time})",
+    )
     needs: ClassVar[str] = "constraints"
     source: ClassVar[str] = "Mow et al. 1980; Holzapfel 2000, sec. 6.4"
     amplitudes: ClassVar[tuple[str, ...]] = ("immediate", "drained")

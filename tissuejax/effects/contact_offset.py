@@ -24,6 +24,7 @@ class ContactOffset(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
     reveals: ClassVar[str] = "force begins too early or too late, by the same depth on the way in and out"
     blind: ClassVar[str] = "one approach at one speed can't tell depth from delay; material tests"
+    words: ClassVar[tuple[str, ...]] = ("the probe was {depth} deeper than recorded", "its clock is {delay} late")
     source: ClassVar[str] = "Lister 2012, 2.2.1 (contact circuit)"
     amplitudes: ClassVar[tuple[str, ...]] = ("depth", "delay")
     order: ClassVar[int] = 0

@@ -22,6 +22,7 @@ class DepthError(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"cutting"})
     reveals: ClassVar[str] = "forces out of proportion to the recorded depth"
     blind: ClassVar[str] = "cuts of one depth"
+    words: ClassVar[tuple[str, ...]] = ("the depth is {offset} off", "the surface rises by {tilt:%} along the path")
     source: ClassVar[str] = "Lister 2012, 3.1.2 (tissue levelled by hand)"
     amplitudes: ClassVar[tuple[str, ...]] = ("offset", "tilt")
 

@@ -29,6 +29,12 @@ class Drift(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing", "cutting"})
     reveals: ClassVar[str] = "stress at rest, growing in time"
     blind: ClassVar[str] = "recordings without samples at rest; a wrong gain is never seen"
+    words: ClassVar[tuple[str, ...]] = (
+        "the load cell's zero is off by {offset}",
+        "it drifts by {rate}",
+        "the load cell's zero is off by {offset_x}, {offset_y}, {offset_z}",
+        "it drifts by {rate_x}, {rate_y}, {rate_z}",
+    )
     source: ClassVar[str] = "linear sensor model"
     order: ClassVar[int] = 0
     separate: bool = False

@@ -22,6 +22,7 @@ class Dulling(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"cutting"})
     reveals: ClassVar[str] = "force that grows along the cut, and from cut to cut"
     blind: ClassVar[str] = "a single short cut"
+    words: ClassVar[tuple[str, ...]] = ("the blade dulls by {growth:%} a metre",)
     source: ClassVar[str] = "McCarthy, Annaidh & Gilchrist 2010, Eng. Fract. Mech. 77"
     amplitudes: ClassVar[tuple[str, ...]] = ("growth",)
 

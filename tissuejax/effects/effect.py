@@ -31,6 +31,9 @@ class Effect(eqx.Module):
         kinds: which experiments it can act in, of {"homogeneous", "probing", "cutting"}.
         reveals: what in a recording shows it.
         blind: experiments (or protocols) that can't show it.
+        words: clauses that say what its fitted parameters mean, "{g1:%} of the stress relaxes with {tau1}": `:%` is a
+            percentage, `:exp` the exponential, else the number with its unit. A clause is said where all parameters in
+            it were fitted and its first one, or another of that unit, isn't zero; one without parameters always.
         needs: what a protocol of material tests must do to show it, a property of `diagnosis.offered.Protocol`; "" if
             nothing in particular. Where it is lacking the effect is another strain energy by its deeds, or nothing.
         amplitudes: parameters that are 0 at neutral; the others ("shapes") vanish with the effect.
@@ -52,6 +55,7 @@ class Effect(eqx.Module):
     kinds: ClassVar[frozenset[str]]
     reveals: ClassVar[str]
     blind: ClassVar[str]
+    words: ClassVar[tuple[str, ...]] = ()
     source: ClassVar[str]
     amplitudes: ClassVar[tuple[str, ...]]
     needs: ClassVar[str] = ""

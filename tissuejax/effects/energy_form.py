@@ -29,6 +29,15 @@ class EnergyForm(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
     reveals: ClassVar[str] = "misfit that depends on stretch alone, not on its past or rate"
     blind: ClassVar[str] = "small strains"
+    words: ClassVar[tuple[str, ...]] = (
+        "the strain energy has another form",
+        "C20 differs by {C20}",
+        "C30 by {C30}",
+        "C01 by {C01}",
+        "C02 by {C02}",
+        "an exponential term of {exponential} is added",
+        "a power of stretch of {ogden} is added",
+    )
     source: ClassVar[str] = "Rivlin and Saunders 1951; Demiray 1972; Ogden 1972"
     terms: tuple[str, ...] = ("C20", "C30", "C01", "C02", "exponential")
 

@@ -21,6 +21,7 @@ class EntrySkin(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"cutting"})
     reveals: ClassVar[str] = "a peak of force at the entry"
     blind: ClassVar[str] = "records that start in the cut"
+    words: ClassVar[tuple[str, ...]] = ("the skin is {gain:%} tougher than what lies below",)
     source: ClassVar[str] = "Glisson's capsule: Hollenstein et al. 2006; Azar & Hayward 2008"
     amplitudes: ClassVar[tuple[str, ...]] = ("gain",)
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"reach": (1e-3, 3e-3)}

@@ -26,6 +26,7 @@ class Friction(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
     reveals: ClassVar[str] = "lateral force against sliding, and its sign change on the way back"
     blind: ClassVar[str] = "a shallow straight press on a level surface; material tests"
+    words: ClassVar[tuple[str, ...]] = ("the tissue rubs on the probe with a coefficient of {coefficient}",)
     source: ClassVar[str] = (
         "Coulomb; Lister 2012, 2.2.4 assumes 0.1; the give before sliding: Dahl 1968, Aerospace report TOR-0158"
     )

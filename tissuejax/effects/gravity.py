@@ -26,6 +26,7 @@ class Gravity(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
     reveals: ClassVar[str] = "tissue that seems stiffer towards the support and softer at its free sides"
     blind: ClassVar[str] = "samples whose sag is small against the depth; material tests"
+    words: ClassVar[tuple[str, ...]] = ("it weighs with {acceleration}",)
     source: ClassVar[str] = "Lister 2012, 2.2.4, with the stress-free shape solved for"
     amplitudes: ClassVar[tuple[str, ...]] = ("acceleration",)
 

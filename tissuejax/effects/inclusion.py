@@ -25,6 +25,9 @@ class Inclusion(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
     reveals: ClassVar[str] = "one site stiffer or softer than the rest, the more the deeper the probe"
     blind: ClassVar[str] = "sites farther off than about twice its depth; material tests"
+    words: ClassVar[tuple[str, ...]] = (
+        "a lump {contrast:exp} times as stiff and {radius} in radius lies at x {x}, y {y}, height {z}",
+    )
     source: ClassVar[str] = "a field of stiffness, as in elastography"
     amplitudes: ClassVar[tuple[str, ...]] = ("contrast",)
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"radius": (3e-3, 5e-3, 8e-3)}

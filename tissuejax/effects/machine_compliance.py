@@ -30,6 +30,7 @@ class MachineCompliance(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
     reveals: ClassVar[str] = "apparent stiffness that falls with load; specimens of unlike size disagree"
     blind: ClassVar[str] = "one specimen in one mode"
+    words: ClassVar[tuple[str, ...]] = ("the rig gives way by {compliance}",)
     needs: ClassVar[str] = "unlike"
     source: ClassVar[str] = "Kalidindi, Abusafieh and El-Danaf 1997"
     order: ClassVar[int] = 0

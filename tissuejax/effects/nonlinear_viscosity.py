@@ -28,6 +28,7 @@ class NonlinearViscosity(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous"})
     reveals: ClassVar[str] = "relaxation that is quicker from larger strain, hysteresis at every rate"
     blind: ClassVar[str] = "a single ramp at constant rate"
+    words: ClassVar[tuple[str, ...]] = ("{g:%} of the stress flows, with {tau} at small load and faster from {stress}",)
     source: ClassVar[str] = "Bergstrom and Boyce 1998, eq. 22"
     order: ClassVar[int] = 2
     amplitudes: ClassVar[tuple[str, ...]] = ("g",)

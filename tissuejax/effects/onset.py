@@ -21,6 +21,7 @@ class Onset(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"cutting"})
     reveals: ClassVar[str] = "a force that is still rising some way after the entry"
     blind: ClassVar[str] = "records that start in the cut"
+    words: ClassVar[tuple[str, ...]] = ("the force takes {longer} more than 2 mm to rise",)
     source: ClassVar[str] = "Mahvash & Hayward 2001 (deformation before rupture)"
     amplitudes: ClassVar[tuple[str, ...]] = ("longer",)
 

@@ -32,6 +32,7 @@ class Periodic(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
     reveals: ClassVar[str] = "a line in the periodogram of the residual"
     blind: ClassVar[str] = "recordings shorter than a period"
+    words: ClassVar[tuple[str, ...]] = ("a load with parts of {sin} and {cos} comes back at {frequency}",)
     source: ClassVar[str] = "Lomb 1976"
     order: ClassVar[int] = 0
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {

@@ -29,6 +29,7 @@ class PermanentSet(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous"})
     reveals: ClassVar[str] = "stress of the opposite sign at the first length, shifted origin in later cycles"
     blind: ClassVar[str] = "monotonic loading"
+    words: ClassVar[tuple[str, ...]] = ("{amount:%} of the largest strain stays",)
     needs: ClassVar[str] = "reversed"
     source: ClassVar[str] = "Mullins 1969; Diani, Fayolle and Gilormini 2009"
     amplitudes: ClassVar[tuple[str, ...]] = ("amount",)

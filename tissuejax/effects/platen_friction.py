@@ -26,6 +26,7 @@ class PlatenFriction(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous"})
     reveals: ClassVar[str] = "compression stiffer than tension allows, the more the flatter the specimen"
     blind: ClassVar[str] = "tension, planar, biaxial and shear tests"
+    words: ClassVar[tuple[str, ...]] = ("the platens rub with a coefficient of {friction}",)
     source: ClassVar[str] = "Siebel 1923; Hill 1950, ch. 10"
     order: ClassVar[int] = 0
     amplitudes: ClassVar[tuple[str, ...]] = ("friction",)

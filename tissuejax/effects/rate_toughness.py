@@ -21,6 +21,7 @@ class RateToughness(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"cutting"})
     reveals: ClassVar[str] = "unlike forces at unlike speeds"
     blind: ClassVar[str] = "one speed"
+    words: ClassVar[tuple[str, ...]] = ("toughness is {gain:%} higher at 10 mm/s",)
     source: ClassVar[str] = "Mahvash & Dupont 2010, IEEE Trans. Biomed. Eng. 57 (power of the needle's speed)"
     amplitudes: ClassVar[tuple[str, ...]] = ("gain",)
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"exponent": (0.3, 0.6)}

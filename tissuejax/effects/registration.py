@@ -26,6 +26,12 @@ class Registration(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
     reveals: ClassVar[str] = "lateral forces and marker patterns that belong to a place beside the recorded one"
     blind: ClassVar[str] = "a level surface without markers; material tests"
+    words: ClassVar[tuple[str, ...]] = (
+        "the probe was {dx} farther along x and {dy} along y",
+        "the probe's radius is {radius} off",
+        "the tissue is {thickness:%} off in thickness",
+        "the cameras are turned by {turn}",
+    )
     source: ClassVar[str] = "Lister 2012, 2.2.4 (registration of robot and cameras)"
     amplitudes: ClassVar[tuple[str, ...]] = ("dx", "dy", "radius", "thickness", "turn")
     order: ClassVar[int] = 0

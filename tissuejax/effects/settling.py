@@ -22,6 +22,7 @@ class Settling(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"cutting"})
     reveals: ClassVar[str] = "force that falls with time at every place"
     blind: ClassVar[str] = "one speed and no rest"
+    words: ClassVar[tuple[str, ...]] = ("{amount:%} of the depth is lost while the tissue settles",)
     source: ClassVar[str] = "Lister 2012, 3.1.3 (settling hides the crack's width)"
     amplitudes: ClassVar[tuple[str, ...]] = ("amount",)
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"time": (3.0, 15.0)}

@@ -25,6 +25,7 @@ class Slack(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous"})
     reveals: ClassVar[str] = "no load around rest, then a sharp onset"
     blind: ClassVar[str] = "recordings that start beyond the gap"
+    words: ClassVar[tuple[str, ...]] = ("the first {gap:%} of the strain is slack",)
     source: ClassVar[str] = "ASTM D882, toe compensation"
     order: ClassVar[int] = 0
     amplitudes: ClassVar[tuple[str, ...]] = ("gap",)

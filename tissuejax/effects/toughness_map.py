@@ -22,6 +22,7 @@ class ToughnessMap(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"cutting"})
     reveals: ClassVar[str] = "force that varies along the path, at no regular period"
     blind: ClassVar[str] = "paths shorter than the knots' distance"
+    words: ClassVar[tuple[str, ...]] = ("toughness changes along the path",)
     source: ClassVar[str] = "Lister 2012, 3.1.3 (strength and energy by segment)"
     knots: int = 6
 

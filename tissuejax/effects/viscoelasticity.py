@@ -38,6 +38,13 @@ class Viscoelasticity(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
     reveals: ClassVar[str] = "relaxation during holds, hysteresis, stiffness that rises with rate"
     blind: ClassVar[str] = "a single ramp at constant rate"
+    words: ClassVar[tuple[str, ...]] = (
+        "{g1:%} of the stress relaxes with {tau1}",
+        "{g2:%} with {tau2}",
+        "{g3:%} with {tau3}",
+        "{g4:%} with {tau4}",
+        "{g5:%} with {tau5}",
+    )
     needs: ClassVar[str] = "rates"
     source: ClassVar[str] = "Fung 1993, sec. 7.6; Simo and Hughes 1998, sec. 10.3"
     order: ClassVar[int] = 2

@@ -1,4 +1,9 @@
-"""How far a prediction may be off: the estimates' uncertainty carried into every channel by the Jacobian."""
+"""Prediction bands: where measured values should lie, from the errors of the estimates and the noise.
+
+The covariance of the estimates is carried into every channel by the Jacobian, var(y) = J Sigma J' (linear propagation
+of errors). A measured value scatters about that by the noise, widened as the standard errors are; the half-width is
+Student's quantile with the residuals' degrees of freedom where the noise's level came from them, the normal one else.
+"""
 
 from collections.abc import Mapping
 
@@ -8,24 +13,49 @@ from jaxtyping import Float
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.uncertainty import Uncertainty
 
-NORMAL_95 = 1.959964  # standard deviations that hold 95 % of a normal distribution
+Std = dict[str, dict[str, Float[np.ndarray, "n ..."]]]
 
 
-def prediction_std(
-    problem: Problem, values: Mapping[str, float], spread: Uncertainty, names: tuple[str, ...]
-) -> dict[str, dict[str, Float[np.ndarray, "n ..."]]]:
+def prediction_std(problem: Problem, values: Mapping[str, float], spread: Uncertainty, names: tuple[str, ...]) -> Std:
     """Standard deviation of the predicted (noise-free) curve, sqrt(diag(J Sigma J')), by recording and channel, SI.
 
     Linear in the parameters around the estimate. Combinations that the data leave open to rounding have no share: their
     columns of J are zero where they were fitted.
     """
     _, slopes = problem.predictor.of(names).jacobian(dict(values), problem.free)
-    sigma = np.where(np.isfinite(spread.covariance), spread.covariance, 0.0)
-    found: dict[str, dict[str, np.ndarray]] = {}
-    for name in names:
-        found[name] = {}
-        for channel in slopes[problem.free[0]][name]:
-            J = np.stack([np.asarray(slopes[path][name][channel], float) for path in problem.free], axis=-1)
-            variance = np.einsum("...i,ij,...j->...", J, sigma, J)
-            found[name][channel] = np.sqrt(np.maximum(variance, 0.0))
+    return {
+        name: {
+            channel: carried(np.stack([np.asarray(slopes[p][name][channel], float) for p in problem.free], -1), spread)
+            for channel in slopes[problem.free[0]][name]
+        }
+        for name in names
+    }
+
+
+def fitted_std(problem: Problem, jacobian: Float[np.ndarray, "n p"], spread: Uncertainty) -> Std:
+    """The same of the fitted recordings from the Jacobian of the residuals, at no further simulation.
+
+    Args:
+        jacobian: of `problem.residuals`, rows of priors included; lost samples have none and are NaN.
+    """
+    found: Std = {}
+    for key, rows in problem.rows.items():
+        recording, channel = key
+        std = np.full(problem.measured[key].shape, np.nan)
+        std[problem.seen[key]] = carried(jacobian[rows], spread) * problem.sigma(key)
+        shape = np.shape(problem.predictor.sample.recordings[recording].channels[channel].values)
+        found.setdefault(recording, {})[channel] = std.reshape(shape)
     return found
+
+
+def carried(J: Float[np.ndarray, "... p"], spread: Uncertainty) -> Float[np.ndarray, "..."]:
+    """sqrt(diag(J Sigma J'))."""
+    sigma = np.where(np.isfinite(spread.covariance), spread.covariance, 0.0)
+    return np.sqrt(np.maximum(np.einsum("...i,ij,...j->...", J, sigma, J), 0.0))
+
+
+def half_width(
+    std: Float[np.ndarray, "..."], noise: float | None, spread: Uncertainty, confidence: float = 0.95
+) -> Float[np.ndarray, "..."]:
+    """Half the width of the band of a measured value: quantile * sqrt(std^2 + (widening * noise)^2)."""
+    return spread.quantile(confidence) * np.sqrt(np.square(std) + (spread.widening * (noise or 0.0)) ** 2)

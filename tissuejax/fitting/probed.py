@@ -20,6 +20,7 @@ from tissuejax.cache import key
 from tissuejax.errors import InputError
 from tissuejax.experiments.probing_predictor import ProbingPredictor, make_ready
 from tissuejax.fitting.advice import warnings_of
+from tissuejax.fitting.bands import fitted_std
 from tissuejax.fitting.closing import Told, changes, close
 from tissuejax.fitting.closing import shifts as numerical_shifts
 from tissuejax.fitting.levenberg_marquardt import Descent
@@ -163,6 +164,7 @@ def fit_probed(
             name: {c: {"before": before[name][c], "after": rms} for c, rms in channels.items()}
             for name, channels in after.items()
         },
+        curve_std=fitted_std(problem, J, spread),
     )
     found.warnings.extend(warnings_of(found))
     if shifts:
@@ -254,7 +256,7 @@ def _with_shifts(noise: Uncertainty, shifts: list[Float[np.ndarray, " p"]]) -> U
     covariance = noise.covariance + sum((np.outer(s, s) for s in shifts), np.zeros_like(noise.covariance))
     std = np.where(np.isfinite(noise.std), np.sqrt(np.diag(covariance)), np.inf)
     correlation = covariance / np.outer(std, std)
-    return Uncertainty(std, covariance, correlation, noise.condition, noise.sentences, noise.inflation, noise.dof)
+    return replace(noise, std=std, covariance=covariance, correlation=correlation)
 
 
 def _numerical_sentence(free, shifts, noise: Uncertainty) -> str:

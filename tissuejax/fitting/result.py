@@ -55,6 +55,8 @@ class Fit:
         method: how it was minimised.
         sites: for probings, root mean square length of the error vectors of each recording and channel, SI, at the
             start and at the end ("before", "after"; Lister 2012, eq. 2.2 and 2.3).
+        curve_std: for probings, standard deviation of the predicted curves of the fitted recordings by recording and
+            channel, SI (`bands`); of material tests it is computed when it is drawn.
     """
 
     problem: Problem
@@ -74,6 +76,7 @@ class Fit:
     warnings: list[str] = field(default_factory=list)
     method: str = "levenberg-marquardt"
     sites: Mapping[str, Mapping[str, Mapping[str, float]]] = field(default_factory=dict)
+    curve_std: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
 
     @property
     def converged(self) -> bool:

@@ -31,6 +31,7 @@ class Uncertainty:
         inflation: variances over those that independent samples of the stated noise would give.
         dof: degrees of freedom of the noise's level; infinite where the recorded one was used.
         serial: whether they allow for correlated residuals.
+        widening: the noise's standard deviation over the stated one, as the residuals have it.
     """
 
     std: Float[np.ndarray, " p"]
@@ -41,6 +42,7 @@ class Uncertainty:
     inflation: Float[np.ndarray, " p"] | None = None
     dof: float = math.inf
     serial: bool = False
+    widening: float = 1.0
 
     def quantile(self, confidence: float = 0.95) -> float:
         """Half-width of a two-sided interval over the standard error: Student's t, 1.96 where the noise is known."""
@@ -104,6 +106,7 @@ def uncertainty(
         np.diag(relative) / np.diag(plain),
         dof,
         correlated is not None,
+        widening,
     )
 
 

@@ -1,16 +1,21 @@
-"""Every effect tried: what one linear step promised at the base fit, and what a full refit made of it."""
+"""Every effect tried: what one linear step promised at the base fit, and what weighing or refitting made of it."""
 
 from typing import ClassVar
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
+from tissuejax.diagnosis.judgement.material_diagnosis import MaterialDiagnosis
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.report.plot import FAINT, HELD, INK, MODEL, Plot, grid
 
+MOST = 14
+
 
 class DiagnosisCandidates(Plot):
-    """Score share and refit of the best form of every effect, alone beside the base."""
+    """The best form of every effect, alone beside the base; of judged tests its evidence, of others its refit."""
 
     name: ClassVar[str] = "candidates"
     subject: ClassVar[type] = Diagnosis
@@ -18,50 +23,88 @@ class DiagnosisCandidates(Plot):
 
     def prepare(self, subject: Diagnosis) -> list[dict] | None:
         """One row an effect, the best first."""
-        s, rows = subject.search, {}
-        base = s.empty
+        judged, rows, base = isinstance(subject, MaterialDiagnosis), {}, subject.search.empty
         for c in subject.candidates():
             if c["refit_chi2_per_sample"] is None and (c["score_share"] or 0.0) < 1e-3:
                 continue
-            empty = {"name": c["name"], "score": 0.0, "fitted": None, "held": None, "chosen": False}
-            row = rows.setdefault(c["name"], empty)
+            row = rows.setdefault(c["name"], {"name": c["name"], "score": 0.0, "rank": np.inf, "chosen": False})
             row["score"] = max(row["score"], c["score_share"] or 0.0)
             row["chosen"] |= c["chosen"]
-            refitted = c["refit_chi2_per_sample"]
-            if refitted is not None and (row["fitted"] is None or refitted < row["fitted"]):
-                row["fitted"], row["held"] = refitted, c["held_out_chi2_per_sample"]
-        found = sorted(rows.values(), key=lambda r: r["fitted"] if r["fitted"] is not None else np.inf)[:14]
+            if judged:
+                row["present"] = c["inclusion"]
+                row["rank"] = min(row["rank"], np.inf if c["criterion"] is None else c["criterion"])
+            elif c["refit_chi2_per_sample"] is not None and c["refit_chi2_per_sample"] < row["rank"]:
+                row["rank"], row["held"] = c["refit_chi2_per_sample"], c["held_out_chi2_per_sample"]
+        found = sorted(rows.values(), key=lambda r: r["rank"])[:MOST]
         for row in found:
             row["base"], row["base_held"] = base.chi2 / base.n, base.held / base.n_held if base.n_held else None
         return found or None
 
     def caption(self, data: list[dict]) -> str:
         """How to read it."""
-        return (
-            "Left: share of the misfit that one linear step beside the base removes (it nominates, it does not "
-            "decide). Right: chi² per sample after a full refit with that effect alone, fitted (dots) and held out "
-            "(rings); the vertical lines are the base model, 1 is noise. Effects of the verdict in blue."
+        left = "Left: share of the misfit that one linear step beside the base removes (it only nominates). "
+        if "present" in data[0]:
+            return left + (
+                "Right: how much more probable the recordings are with that effect alone beside the base than without "
+                "(natural logarithm; left of zero it is worse than nothing), and the probability that it is there at "
+                "all. Effects of the verdict in blue."
+            )
+        return left + (
+            "Right: chi² per sample after a full refit with that effect alone, fitted (dots) and held out (rings). "
+            "Effects of the verdict in blue."
         )
 
     def draw(self, data: list[dict]) -> Figure:
-        """Two panels side by side."""
-        figure, (left, right) = grid(2, columns=2, height=0.6 + 0.26 * len(data))
+        """Two panels side by side, one row an effect."""
+        figure, (left, right) = grid(2, columns=2, height=0.9 + 0.28 * len(data))
         y = np.arange(len(data))[::-1]
-        left.barh(y, [r["score"] for r in data], 0.6, color=[MODEL if r["chosen"] else FAINT for r in data])
-        left.set_yticks(y, [r["name"] for r in data])
+        colours = [MODEL if r["chosen"] else FAINT for r in data]
+        left.barh(y, [r["score"] for r in data], 0.6, color=colours)
         left.set_xlabel("share of the misfit, linear step")
         left.set_xlim(0, 1)
-        for i, row in zip(y, data, strict=True):
-            color = MODEL if row["chosen"] else FAINT
-            if row["fitted"] is not None:
-                right.plot(row["fitted"], i, "o", color=color, markersize=5)
-            if row["held"] is not None:
-                right.plot(row["held"], i, "o", markerfacecolor="none", color=color, markersize=7)
-        right.axvline(data[0]["base"], color=INK, linewidth=0.8)
-        if data[0]["base_held"] is not None:
-            right.axvline(data[0]["base_held"], color=HELD, linewidth=0.8, linestyle="--")
-        right.axvline(1, color=INK, linewidth=0.6, linestyle=":")
-        right.set_yticks(y, [])
-        right.set_xscale("log")
-        right.set_xlabel("chi² per sample after refit")
+        for ax in (left, right):
+            ax.set_yticks(y, [r["name"].replace("-", " ") for r in data])
+            ax.set_ylim(-0.6, len(data) - 0.4)
+        (_evidence if "present" in data[0] else _refits)(right, data, y, colours)
+        legend = {"effect of the verdict": Patch(color=MODEL), "other effect": Patch(color=FAINT)}
+        legend |= {t: h for h, t in zip(*right.get_legend_handles_labels(), strict=True)}
+        figure.legend(
+            legend.values(), legend, loc="outside lower center", ncols=min(4, len(legend)), frameon=False, fontsize=8
+        )
         return figure
+
+
+def _evidence(ax, data: list[dict], y, colours) -> None:
+    gain = np.array([-0.5 * r["rank"] for r in data])
+    known = np.isfinite(gain)
+    ax.barh(y[known], gain[known], 0.6, color=[c for c, k in zip(colours, known, strict=True) if k])
+    ax.axvline(0, color=INK, linewidth=0.6)
+    for i, row, g in zip(y, data, gain, strict=True):
+        p = row["present"]
+        text = "99 in 100 and more" if p > 0.99 else f"{100 * p:.0f} in 100" if p >= 0.01 else ""
+        if text:
+            inside = g > 0.6 * np.nanmax(np.where(known, gain, np.nan))
+            ax.annotate(
+                text, (g if np.isfinite(g) else 0.0, i), (-4 if inside else 4, 0), textcoords="offset points",
+                va="center", ha="right" if inside else "left", fontsize=8, color="white" if inside else INK,
+            )  # fmt: skip
+    ax.set_xscale("symlog", linthresh=10)
+    ax.set_xlabel("gain in ln evidence over the base alone")
+
+
+def _refits(ax, data: list[dict], y, colours) -> None:
+    for i, row, colour in zip(y, data, colours, strict=True):
+        if np.isfinite(row["rank"]):
+            ax.plot(row["rank"], i, "o", color=colour, markersize=5)
+        if row.get("held") is not None:
+            ax.plot(row["held"], i, "o", markerfacecolor="none", color=colour, markersize=7)
+    ax.axvline(data[0]["base"], color=INK, linewidth=0.8, label="base, fitted")
+    if data[0]["base_held"] is not None:
+        ax.axvline(data[0]["base_held"], color=HELD, linewidth=0.8, linestyle="--", label="base, held out")
+    ax.axvline(1, color=INK, linewidth=0.6, linestyle=":", label="noise alone")
+    ax.add_line(Line2D([], [], marker="o", linestyle="", color=INK, markersize=5, label="refit, fitted"))
+    ax.add_line(
+        Line2D([], [], marker="o", linestyle="", color=INK, markerfacecolor="none", markersize=7, label="held out")
+    )
+    ax.set_xscale("log")
+    ax.set_xlabel("chi² per sample after refit")

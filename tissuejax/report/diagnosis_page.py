@@ -6,6 +6,7 @@ from tissuejax.diagnosis.judgement.evidence import write_evidence
 from tissuejax.diagnosis.judgement.material_diagnosis import MaterialDiagnosis
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.report import diagnosis_sentences as sentences
+from tissuejax.report.headline import headline
 from tissuejax.report.page import figures, render
 from tissuejax.storage import write_bytes, write_json, write_text
 
@@ -35,6 +36,7 @@ def write_diagnosis(found: Diagnosis, out: Path, remainders: bool = True) -> dic
         title=f"Diagnosis of {found.sample}",
         d=found,
         record=record,
+        headline=headline(found),
         lead=sentences.lead(found),
         sure=sentences.sure(found),
         limits=sentences.limits(found),

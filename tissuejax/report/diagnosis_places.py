@@ -4,6 +4,8 @@ from typing import ClassVar
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from tissuejax.diagnosis.locate import PHASES, phases, rest_value
 from tissuejax.diagnosis.result import Diagnosis
@@ -70,8 +72,9 @@ class DiagnosisPlaces(Plot):
             x = np.arange(len(labels))
             ax.bar(x - 0.2, before, 0.38, color=FAINT)
             ax.bar(x + 0.2, after, 0.38, color=[HELD if n in data["held"] else MODEL for n in labels])
-            ax.set_xticks(x, labels)
-            ax.set_xlabel(cut if cut == "phase" else "recording (orange: held out)")
+            crowded = len(labels) > 5 or max(map(len, labels)) > 11
+            ax.set_xticks(x, labels, rotation=40 if crowded else 0, ha="right" if crowded else "center")
+            ax.set_xlabel(cut)
         centres, before, after = data["drive"]
         axes[2].plot(centres, before, "o-", color=FAINT, markersize=3.5)
         axes[2].plot(centres, after, "o-", color=MODEL, markersize=3.5)
@@ -81,4 +84,10 @@ class DiagnosisPlaces(Plot):
             ax.set_yscale("log")
             ax.axhline(1, color=INK, linewidth=0.6, linestyle=":")
         axes[0].set_ylabel("chi² per sample")
+        colours = {"base model": FAINT, "with effects": MODEL} | (
+            {"with effects, held out": HELD} if data["held"] else {}
+        )
+        handles = [*(Patch(color=c) for c in colours.values()), Line2D([], [], color=INK, linewidth=0.6, linestyle=":")]
+        names = [*colours, "noise alone"]
+        figure.legend(handles, names, loc="outside lower center", ncols=len(names), frameon=False, fontsize=8)
         return figure

@@ -6,11 +6,14 @@ from typing import ClassVar
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.report.plot import FAINT, HELD, INK, MODEL, Plot, grid
 
 DENSE, MOST = 1500, 9
+BAND = "#e0e6ea"
+DONE = {"color": INK, "linewidth": 0.8, "linestyle": ":"}
 
 
 @dataclass(frozen=True)
@@ -61,30 +64,29 @@ class DiagnosisResiduals(Plot):
         return (
             "Measured minus predicted, in units of the noise. Grey: base model alone. Blue (fitted) and orange (held "
             "out, not fitted for the curves shown): with the effects of the verdict. Inside the pale band lies what "
-            "noise alone gives. The thin line is what was done to the specimen."
+            "noise alone gives. Dotted: what was done to the specimen, without a scale of its own."
         )
 
     def draw(self, data: list[Pair]) -> Figure:
         """One panel a series."""
-        figure, axes = grid(len(data), columns=min(3, len(data)), height=2.5)
+        figure, axes = grid(len(data), columns=2 if len(data) in (2, 4) else min(3, len(data)), height=2.5)
         for ax, pair in zip(axes, data, strict=True):
             thin = slice(None, None, max(1, len(pair.time) // DENSE))
-            ax.axhspan(-2, 2, color="#e9edf0", zorder=0)
+            ax.axhspan(-2, 2, color=BAND, zorder=0)
             ax.plot(pair.time[thin], pair.before[thin], color=FAINT, linewidth=0.9)
             ax.plot(pair.time[thin], pair.after[thin], color=HELD if pair.held else MODEL, linewidth=0.8)
             ax.set_title(pair.title + (" (held out)" if pair.held else ""), loc="left", fontsize=9.5, color=INK)
             ax.set_xlabel("time (s)")
             ax.set_ylabel("residual / noise")
             behind = ax.twinx()
-            behind.plot(pair.time[thin], pair.drive[thin], color=INK, linewidth=0.5, alpha=0.45)
+            behind.plot(pair.time[thin], pair.drive[thin], **DONE)
             behind.set_yticks([])
             behind.spines[:].set_visible(False)
-        handles = [Line2D([], [], color=c) for c in (FAINT, MODEL, HELD)]
-        figure.legend(
-            handles,
-            ["base model", "with effects, fitted", "with effects, held out"],
-            loc="outside upper right",
-            ncols=3,
-            fontsize=8,
-        )
+        lines = {"base model": {"color": FAINT}, "with effects, fitted": {"color": MODEL}}
+        lines |= {"with effects, held out": {"color": HELD}} if any(p.held for p in data) else {}
+        lines |= {"what was done (no scale)": DONE}
+        handles = [Line2D([], [], **style) for style in lines.values()]
+        handles.append(Patch(color=BAND))
+        names = [*lines, "noise alone"]
+        figure.legend(handles, names, loc="outside lower center", ncols=len(names), frameon=False, fontsize=8)
         return figure

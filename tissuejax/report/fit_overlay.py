@@ -7,11 +7,11 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from tissuejax.fitting.bands import NORMAL_95, prediction_std
+from tissuejax.fitting.bands import half_width, prediction_std
 from tissuejax.fitting.result import Fit
-from tissuejax.report.plot import FAINT, HELD, INK, MEASURED, MODEL, Plot, grid
+from tissuejax.report.plot import BASE, HELD, INK, MEASURED, MODEL, Plot, grid, legend_below, scatter
 from tissuejax.report.scales import display, label
-from tissuejax.report.series import Curve, curves, curves_of
+from tissuejax.report.series import Curve, components, curves
 
 MOST = 8  # series; more recordings than this are better read in the table
 DENSE = 400  # points drawn a panel
@@ -71,12 +71,7 @@ class FitOverlay(Plot):
             elif both:
                 next(panels).set_visible(False)
             draw_shown(next(panels), shown, by_time=True)
-        known = {}
-        for ax in axes:
-            for handle, text in zip(*ax.get_legend_handles_labels(), strict=True):
-                known.setdefault(text, handle)
-        columns = min(5, len(known))
-        figure.legend(known.values(), known, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)
+        legend_below(figure, axes)
         return figure
 
 
@@ -87,13 +82,13 @@ def draw_shown(ax, shown: Shown, by_time: bool) -> None:
     x = curve.time if by_time else curve.drive
     colour, kind = (HELD, "model, held out") if curve.held else (MODEL, "model")
     thin = slice(None, None, max(1, len(x) // DENSE))
-    ax.plot(x[thin], curve.measured[thin] / factor, ".", color=MEASURED, markersize=2.6, zorder=4, label="measured")
+    scatter(ax, x[thin], curve.measured[thin] / factor)
     if shown.bare is not None:
-        ax.plot(x, shown.bare / factor, "--", color=FAINT, linewidth=1.1, label="effects off")
+        ax.plot(x, shown.bare / factor, "--", color=BASE, linewidth=1.1, zorder=3, label="effects off")
     if shown.band is not None and (by_time or curve.monotone):
         low, high = ((curve.predicted + side * shown.band) / factor for side in (-1, 1))
-        ax.fill_between(x, low, high, color=colour, alpha=0.18, linewidth=0, label="95 % band")
-    ax.plot(x, curve.predicted / factor, color=colour, linewidth=1.6, alpha=0.9, label=kind)
+        ax.fill_between(x, low, high, color=colour, alpha=0.22, linewidth=0, label="95 % band")
+    ax.plot(x, curve.predicted / factor, color=colour, linewidth=1.3, zorder=4, label=kind)
     ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontsize=9.5, color=INK)
     ax.set_xlabel("time (s)" if by_time else curve.drive_name)
     ax.set_ylabel(f"{curve.channel.replace('_', ' ')}{label(unit)}")
@@ -105,7 +100,7 @@ def draw_curve(ax, curve: Curve) -> None:
     by_time = curve.drive is None or curve.held_still
     x = curve.time if by_time else curve.drive
     thin = slice(None, None, max(1, len(x) // DENSE))
-    ax.plot(x[thin], curve.measured[thin] / factor, ".", color=MEASURED, markersize=3.5, alpha=0.7, zorder=2)
+    ax.plot(x[thin], curve.measured[thin] / factor, ".", color=MEASURED, markersize=3.5, zorder=2)
     if curve.predicted is not None:
         ax.plot(x, curve.predicted / factor, color=HELD if curve.held else MODEL, linewidth=1.5, zorder=3)
     ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontsize=9.5, color=INK)
@@ -114,27 +109,26 @@ def draw_curve(ax, curve: Curve) -> None:
 
 
 def _bands(found: Fit) -> dict[tuple[str, str], np.ndarray]:
-    """Half widths by (recording, channel label); of material tests only, since a probing's Jacobian takes minutes."""
-    problem = found.problem
-    if problem.predictor.name != "homogeneous":
-        return {}
-    spread = prediction_std(problem, found.values, found.uncertainty, tuple(found.predictions))
-    return {
-        key: NORMAL_95 * np.sqrt(values**2 + (level or 0.0) ** 2) for key, values, level in _labelled(found, spread)
-    }
+    """Half widths by (recording, channel label); of probings for the fitted recordings, whose Jacobian the fit has."""
+    problem, spread = found.problem, found.uncertainty
+    std = found.curve_std
+    if problem.predictor.name == "homogeneous":
+        std = prediction_std(problem, found.values, spread, tuple(found.predictions))
+    return {key: half_width(values, level, spread) for key, values, level in _labelled(found, std)}
 
 
 def _labelled(found: Fit, series):
-    """((recording, channel label), one column, noise level) of arrays by recording and channel."""
-    measured, std = found.problem.predictor.sample.recordings, found.problem.noise.std
+    """((recording, channel label), one column, noise level) of arrays by recording and channel; no clouds of markers,
+    whose mean distance is no column."""
+    levels = found.problem.noise.std
+    of_channel = {key.split("/")[-1]: s for key, s in levels.items()}
     for name, channels in series.items():
-        for curve in curves_of(measured[name], None, std):
-            for channel, values in channels.items():
-                stem, _, k = curve.channel.partition(" ")
-                if stem != channel:
-                    continue
-                column = values if np.ndim(values) == 1 else np.asarray(values)[:, int(k) - 1 if k.isdigit() else 0]
-                yield (name, curve.channel), np.asarray(column, float), curve.std
+        measured = found.problem.predictor.sample.recordings[name].channels
+        for channel, values in channels.items():
+            values = np.asarray(values, float)
+            level = levels.get(f"{name}/{channel}") or measured[channel].noise_std or of_channel.get(channel)
+            for k, shown in components(channel, values) if values.ndim < 3 else ():
+                yield (name, shown), values if values.ndim == 1 else values[:, k], level
 
 
 def _bare(found: Fit) -> dict[tuple[str, str], np.ndarray]:

@@ -7,7 +7,8 @@ import equinox as eqx
 from matplotlib.figure import Figure
 
 INK, FAINT, PAPER = "#22313f", "#8795a1", "#ffffff"
-MODEL, HELD, MEASURED = "#1f6fb2", "#d9730d", "#5b6b7a"
+MODEL, HELD, MEASURED = "#1f6fb2", "#d9730d", "#8a97a3"
+BASE = "#22313f"  # the model before anything was added to it
 SERIES = ("#1f6fb2", "#d9730d", "#3a9d5d", "#a64ca6", "#c0392b", "#7a6a2f", "#16838f", "#555555")
 
 
@@ -48,6 +49,22 @@ def grid(n: int, columns: int = 3, width: float = 10.0, height: float = 2.7, **o
     for ax in axes:
         tidy(ax)
     return figure, axes[:n]
+
+
+def legend_below(figure: Figure, axes: list, columns: int = 6) -> None:
+    """One legend for all axes under the figure, every label once."""
+    known = {}
+    for ax in axes:
+        for handle, text in zip(*ax.get_legend_handles_labels(), strict=True):
+            known.setdefault(text, handle)
+    if known:
+        columns = min(columns, len(known))
+        figure.legend(known.values(), known, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)
+
+
+def scatter(ax, x, y) -> None:
+    """Measured values: large pale points that a model's line can be seen on."""
+    ax.plot(x, y, "o", color=MEASURED, alpha=0.6, markersize=4, markeredgewidth=0, zorder=2, label="measured")
 
 
 def tidy(ax) -> None:

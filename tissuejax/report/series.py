@@ -65,7 +65,7 @@ def curves_of(recording: Recording, prediction: Recording | None = None, std=Non
         predicted = None if other is None else np.asarray(other.values, float)
         level = (std or {}).get(f"{recording.name}/{name}", channel.noise_std)
         drive_name, drive = _drive(recording, channel)
-        for k, label in _components(name, measured):
+        for k, label in components(name, measured):
             own = drive[:, k] if drive is not None and drive.ndim == 2 and measured.ndim == 2 else drive
             own = None if own is None or own.ndim != 1 else own
             found.append(
@@ -105,7 +105,8 @@ def _drive(recording: Recording, channel: Channel) -> tuple[str, np.ndarray | No
     return "", None
 
 
-def _components(name: str, values: np.ndarray) -> list[tuple[int, str]]:
+def components(name: str, values: np.ndarray) -> list[tuple[int, str]]:
+    """(column, label) of each scalar series of a channel; a cloud of markers is one."""
     if values.ndim == 2:
         axes = AXES.get(name, "0123456789")
         return [(k, f"{name} {axes[k] if k < len(axes) else k}") for k in range(values.shape[1])]

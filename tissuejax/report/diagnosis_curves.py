@@ -1,0 +1,155 @@
+"""The first figure of a diagnosis: what was measured, what the base model says, and what it says with the effects."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.figure import Figure
+
+from tissuejax.diagnosis.bench import Segment
+from tissuejax.diagnosis.foreseen import prediction_std
+from tissuejax.diagnosis.judgement.material_diagnosis import MaterialDiagnosis
+from tissuejax.diagnosis.result import Diagnosis
+from tissuejax.report.plot import BASE, HELD, INK, MODEL, Plot, grid, legend_below, scatter
+from tissuejax.report.scales import display, label
+
+MOST = 5
+DENSE = 1500
+NORMAL_95 = 1.959964
+
+
+@dataclass(frozen=True)
+class Told:
+    """One series, SI.
+
+    Attributes:
+        title: recording and channel.
+        measured, base, improved: the series; `improved` is None where nothing was added to the base.
+        half: half-width of the 95 % band about the improved (or base) model.
+        drive: what was done, with its name and SI unit; `swept` if it moves enough to be an axis.
+        held: whether the recording took no part in the fits shown.
+    """
+
+    title: str
+    channel: str
+    time: Float[np.ndarray, " n"]
+    drive: Float[np.ndarray, " n"]
+    drive_name: str
+    drive_unit: str
+    measured: Float[np.ndarray, " n"]
+    base: Float[np.ndarray, " n"]
+    improved: Float[np.ndarray, " n"] | None
+    half: Float[np.ndarray, " n"]
+    unit: str
+    held: bool
+
+    @property
+    def swept(self) -> bool:
+        """Whether the drive moves at all."""
+        return bool(np.ptp(self.drive) > 0)
+
+
+class DiagnosisCurves(Plot):
+    """Measured, base and improved, in the channel's own unit."""
+
+    name: ClassVar[str] = "measured"
+    subject: ClassVar[type] = Diagnosis
+    order: ClassVar[int] = 5
+
+    def prepare(self, subject: Diagnosis) -> list[Told]:
+        """The series that the base misses most, held-out ones always among them, and the marker that it misses most."""
+        bench, base, chosen = subject.search.bench, subject.search.empty, subject.verdict.chosen
+        half = _half(subject)
+        z = (bench.y - base.prediction) / bench.sigma
+
+        def miss(s: Segment) -> float:
+            return float(np.mean(z[s.rows] ** 2))
+
+        scalar = [s for s in bench.segments if "marker" not in s.component and _carries(bench, s)]
+        held = sorted((s for s in scalar if s.recording in bench.held_out), key=miss)[::-1][:2]
+        marks = sorted((s for s in bench.segments if "marker" in s.component), key=miss)[-1:]
+        fitted = sorted((s for s in scalar if s.recording not in bench.held_out), key=miss)[::-1]
+        names = (*bench.fitted, *bench.held_out)
+        shown = fitted[: MOST - len(held) - len(marks)] + held + marks
+        return [
+            Told(
+                f"{s.recording}{' (held out)' if s.recording in bench.held_out else ''}",
+                s.label.replace("_", " "),
+                s.time,
+                s.drive,
+                s.drive_name,
+                s.drive_unit,
+                bench.y[s.rows],
+                base.prediction[s.rows],
+                chosen.prediction[s.rows] if chosen.keys else None,
+                half[s.rows],
+                s.unit,
+                s.recording in bench.held_out,
+            )
+            for s in sorted(shown, key=lambda s: (names.index(s.recording), s.label))
+        ]
+
+    def caption(self, data: list[Told]) -> str:
+        """What the lines are, and how many of the held-out values the band holds."""
+        effects = any(t.improved is not None for t in data)
+        text = "Measured (points), the base model (dashed)" + (" and with the effects named (line)" if effects else "")
+        text += ", over what was done and over time. Band: where 95 % of measured values should lie"
+        held = [t for t in data if t.held]
+        if held:
+            model = [t.base if t.improved is None else t.improved for t in held]
+            inside = np.concatenate([np.abs(t.measured - m) <= t.half for t, m in zip(held, model, strict=True)])
+            text += f"; it holds {np.mean(inside):.0%} of those held out"
+        return text + "."
+
+    def draw(self, data: list[Told]) -> Figure:
+        """A row a series: left over what was done, right over time."""
+        figure, axes = grid(2 * len(data), columns=2, height=2.5)
+        for i, told in enumerate(data):
+            if told.swept:
+                _draw(axes[2 * i], told, by_time=False)
+            else:
+                axes[2 * i].set_visible(False)
+            _draw(axes[2 * i + 1], told, by_time=True)
+        legend_below(figure, axes)
+        return figure
+
+
+def _draw(ax, told: Told, by_time: bool) -> None:
+    factor, unit = display(told.unit, float(np.nanmax(np.abs(told.measured), initial=0.0)))
+    thin = slice(None, None, max(1, len(told.time) // DENSE))
+    scale, drive_unit = display(told.drive_unit, float(np.nanmax(np.abs(told.drive), initial=0.0)))
+    x = (told.time if by_time else told.drive / scale)[thin]
+    colour, kind = (HELD, ", held out") if told.held else (MODEL, "")
+    best = told.base if told.improved is None else told.improved
+    scatter(ax, x, told.measured[thin] / factor)
+    if by_time:
+        low, high = ((best + side * told.half)[thin] / factor for side in (-1, 1))
+        ax.fill_between(x, low, high, color=colour, alpha=0.22, linewidth=0, label=f"95 % band{kind}", zorder=1)
+    line = {"linewidth": 1.3, "zorder": 4}
+    if told.improved is None:
+        ax.plot(x, told.base[thin] / factor, color=colour, label=f"base model{kind}", **line)
+    else:
+        ax.plot(x, told.base[thin] / factor, color=BASE, linestyle=(0, (4, 2)), label="base model", **line)
+        ax.plot(x, told.improved[thin] / factor, color=colour, label=f"with effects{kind}", **line)
+    ax.set_title(told.title, loc="left", fontsize=9.5, color=INK)
+    ax.set_xlabel("time (s)" if by_time else f"{told.drive_name}{label(drive_unit)}")
+    ax.set_ylabel(f"{told.channel}{label(unit)}")
+
+
+def _carries(bench, s: Segment) -> bool:
+    """Whether a component of a channel is more than a twentieth of the channel's largest."""
+    alike = [o for o in bench.segments if (o.recording, o.channel) == (s.recording, s.channel)]
+    largest = max(float(np.max(np.abs(bench.y[o.rows]))) for o in alike)
+    return float(np.max(np.abs(bench.y[s.rows]))) > 0.05 * largest
+
+
+def _half(d: Diagnosis) -> Float[np.ndarray, " N"]:
+    """Half-widths: noise, errors of the estimates where a prediction costs nothing, and what any law leaves."""
+    bench = d.search.bench
+    variance = bench.sigma**2
+    if isinstance(d, MaterialDiagnosis):
+        a, keys = d.answered, frozenset(d.answered.chosen.keys)
+        variance = variance + a.rest()["rms"] ** 2
+        variance = variance + prediction_std(a.bench, a.whitenings[keys], a.plain[keys]) ** 2
+    return NORMAL_95 * np.sqrt(variance)
