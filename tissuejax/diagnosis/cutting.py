@@ -136,11 +136,8 @@ def strokes_to_settle(sample: Sample, bench: CuttingBench, verdict) -> list[str]
     """Sentences on the strokes that would tell the answer from its first rival, best first; none without a rival."""
     if not verdict.rivals:
         return []
-    model = bench._p.model.across(())
-    fits = [
-        (model, {q: float(r.all.get(q, bench.start[q])) for q in bench._order})
-        for r in (verdict.chosen, verdict.rivals[0])
-    ]
+    model, pair = bench._p.model.across(()), (verdict.chosen, verdict.rivals[0])
+    fits = [(model, {q: float(r.all.get(q, bench.start[q])) for q in bench._order}) for r in pair]
     strokes = next_cut(sample, bench.fitted[0], *fits)
     names = [" and ".join(r.keys) or "nothing" for r in pair]
     return [
