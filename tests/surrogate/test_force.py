@@ -72,9 +72,28 @@ def test_closed_loops_do_no_work_elastic_and_lose_when_it_relaxes_or_rubs():
 def test_above_beside_and_below_the_box():
     s = made.formula()
     assert not np.any(elastic(s, made.at(0.0, 0.0, -1e-3)))
-    assert not np.any(elastic(s, made.at(0.012, 0.0, 3e-3)))  # more than a millimetre beside
+    assert not Asker(s).tick(made.at(0.012, 0.0, 3e-3), 1e-3).any()  # more than a millimetre beside
     deepest = made.vertical(0.0, 0.0, made.DEPTH)
     assert float(elastic(s, made.at(0.0, 0.0, made.DEPTH + 2e-3))[2]) == pytest.approx(deepest, rel=1e-3)
+
+
+def test_over_the_side_the_force_fades_without_a_kick_and_returns_after_a_lift():
+    """Out over the side at depth, back in, out of contact and down again: nothing pushes outwards, no work is won."""
+    for s in (made.formula(), made.formula(g=(0.3,), tau=(0.5,), friction=0.2, strength=100.0)):
+        t = np.linspace(0, 8, 8001)
+        knots = [0, 1, 2, 3, 4, 5, 6, 7, 8]
+        x = np.interp(t, knots, [0.009, 0.009, 0.0125, 0.009, 0.009, 0.009, 0.009, 0.0125, 0.0125])
+        d = np.interp(t, knots, [-1e-3, 3e-3, 3e-3, 3e-3, -3e-3, 3e-3, 3e-3, 3e-3, -3e-3])
+        path = np.stack([x, 0 * x, made.height(np.minimum(x, 0.01), 0.0) - d], 1)
+        force = asked(s, t, path)
+        inside = np.linalg.norm(force[900:1100, :2], axis=1).max()
+        assert np.linalg.norm(force[:, :2], axis=1).max() < 1.5 * inside + 0.05 * force[:, 2].max()
+        assert not force[(t > 2) & (t < 4)].any()  # gone until it was lifted
+        assert force[4900:5900, 2].max() > 0.5 * made.vertical(0.009, 0.0, 3e-3)
+        mean = (force[1:] + force[:-1]) / 2
+        given = -np.cumsum(np.sum(mean * np.diff(path, axis=0), axis=1))  # by the hand
+        assert given.min() > -1e-3 * made.work(0.009, 0.0, 3e-3)
+        assert given[-1] > 0.9 * made.work(0.009, 0.0, 3e-3)
 
 
 def test_lifted_tissue_does_not_pull():
@@ -91,7 +110,7 @@ def test_numpy_asks_the_same_as_jax_with_everything_on():
     s = made.formula(g=(0.2, 0.1), tau=(0.4, 4.0), friction=0.3, strength=150.0)
     t = np.linspace(0, 3, 301)
     d = np.interp(t, [0, 1, 2, 2.6, 3], [-1e-3, 4e-3, 0.0065, -5e-4, -2e-3])  # beyond the floor and a side
-    x = np.interp(t, [0, 1.2, 2.2, 3], [-0.004, -0.004, 0.0104, 0.0104])
+    x = np.interp(t, [0, 1.2, 2.0, 2.2, 3], [-0.004, -0.004, 0.0104, 0.0098, 0.0104])  # a little out, and back
     path = np.stack([x, 0.3 * x, made.height(x, 0.3 * x) - d], 1)
     wanted = np.asarray(eqx.filter_jit(lambda s, t, p: s.respond(t, p))(s, jnp.asarray(t), jnp.asarray(path)))
     got = asked(s, t, path)

@@ -23,9 +23,11 @@ from tissuejax.recordings.files import read
 from tissuejax.surrogate import store
 from tissuejax.surrogate.live import flat
 from tissuejax.surrogate.live.ask import Asker
-from tissuejax.surrogate.live.direct import Direct, keeps_up
+from tissuejax.surrogate.live.direct import SLOWEST, Direct, keeps_up, largest
 from tissuejax.surrogate.precompute import Precomputed
 from tissuejax.surrogate.site_mesh import Grid
+
+FIRST = "12x12x4"  # the mesh of --direct that is tried first
 
 
 class Play(Command):
@@ -55,7 +57,7 @@ A loop without permission for real-time priority runs and says so. A direct scen
         add_tissue(parser)
         parser.add_argument("--direct", action="store_true", help="SOURCE as for precompute; simulate in the loop")
         parser.add_argument("--site", metavar="X,Y", help="with --direct: where the mesh is fine, mm")
-        parser.add_argument("--mesh", default="12x12x4", metavar="AxBxC", help="with --direct (default 12x12x4)")
+        parser.add_argument("--mesh", metavar="AxBxC", help="with --direct (default: 12x12x4, or what keeps up)")
         parser.add_argument("--depth", type=float, default=7.0, metavar="MM", help="with --direct: of the wheel")
         parser.add_argument("--export", type=Path, metavar="FILE", help="write page.html or model.tjf")
         parser.add_argument("--replay", metavar="FILE", help="recording file; with --recording NAME")
@@ -148,13 +150,21 @@ def _replayed(made: Precomputed, given: argparse.Namespace) -> Reply:
 def _direct(given: argparse.Namespace) -> Reply:
     what: Tissue = tissue(given)
     place = what.site if given.site is None else place_of(given.site)
-    grid = Grid(counts_of(given.mesh), what.matter.radius)
+    grid = Grid(counts_of(given.mesh or FIRST), what.matter.radius)
     direct = Direct(what.matter, grid, place)
-    pace = keeps_up(direct.pace(), grid)
+    pace = direct.pace()
+    if given.mesh is None and pace.times_life < SLOWEST:
+        grid = largest(pace, grid)
+        direct = Direct(what.matter, grid, place)
+        pace = direct.pace()
+    keeps_up(pace, grid)
+    mesh = "x".join(map(str, grid.counts))
+    words = f"mesh {mesh}: {pace.times_life:.1f} times life, a call of {1e3 * direct.call:.2g} ms takes "
+    words += f"{pace.call_p50_ms:.2f} ms (p50), {pace.call_p99_ms:.2f} ms (p99)"
     if given.seconds == 0:
-        return Reply(
-            {"pace": pace._asdict()}, f"{pace.times_life:.1f} times life, a call {pace.call_p99_ms:.2f} ms (p99)"
-        )
+        return Reply({"mesh": list(grid.counts), "pace": pace._asdict()}, words)
+    if not given.json:
+        print(words, flush=True)
     title = "slab" if what.sample is None else what.sample.name
     return serve(DirectSession(direct, pace, place, given.depth / 1e3, title, "the full model in the loop"), given)
 

@@ -13,16 +13,26 @@ from jaxtyping import Array, Float
 from scipy.interpolate import make_interp_spline
 
 
-def weights(u, xp=jnp):
-    """The four basis functions at u in [0, 1], (4, ...)."""
+def four(u) -> tuple:
+    """The four basis functions at u in [0, 1], of a number or an array."""
     v = 1.0 - u
-    return xp.stack([v**3, (3 * u - 6) * u * u + 4, (3 * v - 6) * v * v + 4, u**3]) / 6
+    return v**3 / 6, ((3 * u - 6) * u * u + 4) / 6, ((3 * v - 6) * v * v + 4) / 6, u**3 / 6
+
+
+def four_slopes(u) -> tuple:
+    """Their derivatives by u."""
+    v = 1.0 - u
+    return -v * v / 2, (3 * u - 4) * u / 2, -(3 * v - 4) * v / 2, u * u / 2
+
+
+def weights(u, xp=jnp):
+    """The basis functions as one array, (4, ...)."""
+    return xp.stack(four(u))
 
 
 def slopes(u, xp=jnp):
     """Their derivatives by u, (4, ...)."""
-    v = 1.0 - u
-    return xp.stack([-v * v, (3 * u - 4) * u, -(3 * v - 4) * v, u * u]) / 2
+    return xp.stack(four_slopes(u))
 
 
 def design(t: Float[np.ndarray, " m"], intervals: int, derivative: bool = False) -> Float[np.ndarray, "m c"]:

@@ -2,8 +2,13 @@
 
 The force comes from one energy: W(x, y, d) = D^2.5 s^5 w(x, y, s), s = sqrt(d / D), is the vertical force integrated
 over the depth d below first contact, and the force is -dW/dp: a closed path does no work, by construction. Relaxation
-is a memory of stress modes (`memory.py`), friction and adhesion lie on top (`drag.py`). Beyond the sides of the box the
-energy fades to zero within `FADE`; below its depth the force stays what it is at the deepest.
+is a memory of stress modes (`memory.py`), friction and adhesion lie on top (`drag.py`). Below the box the force stays
+what it is at the deepest.
+
+Beyond the sides of the box the force fades to zero within `FADE`, and once faded comes back only after the ball has
+been lifted: with a share c of the whole force that never rises while the ball touches, c W is a storage function of
+which the hand gets back no more than it gave. (Fading W itself along the path would be without loss, and would push the
+ball out with W / FADE, newtons where the press takes a tenth of one.)
 """
 
 from collections.abc import Mapping
@@ -18,7 +23,7 @@ from jaxtyping import Array, Float, Int
 from tissuejax.surrogate import drag
 from tissuejax.surrogate.cardinal import Table
 
-FADE = 1e-3  # m beyond the sides of the box over which the energy fades
+FADE = 1e-3  # m beyond the sides of the box over which the force fades
 
 
 class Surface(eqx.Module):
@@ -55,12 +60,13 @@ class Rig(eqx.Module):
 
 
 class State(NamedTuple):
-    """What one tick hands to the next: stress modes gone (K, M) and as they are now (M,), and friction's and
-    adhesion's memories."""
+    """What one tick hands to the next: stress modes gone (K, M) and as they are now (M,), friction's and adhesion's
+    memories, and the share of the force that is left since the ball touched (1 within the box)."""
 
     gone: Float[Array, "K M"]
     now: Float[Array, " M"]
     grip: drag.Grip
+    share: Float[Array, ""]
 
 
 class Surrogate(eqx.Module):
@@ -106,7 +112,7 @@ class Surrogate(eqx.Module):
         return 1 - r * r * r * (10 - 15 * r + 6 * r * r)
 
     def energy(self, p: Float[Array, "3"]) -> Float[Array, ""]:
-        """Elastic energy with the ball's centre at p, J."""
+        """Elastic energy with the ball's centre at p, J; beyond the sides that of the nearest place in the box."""
         place, _, below = self._scaled(p)
         s = place[2]
         w = self.law(place)[0]
@@ -114,7 +120,7 @@ class Surrogate(eqx.Module):
         # below the box the vertical force stays that at its floor: (5 w + dw/ds) / 2 there
         slope = self.law(place, 2)[0]
         value = value + below * self.depth**1.5 * (5 * w + slope) / 2
-        return self.factor * self.within(p) * value
+        return self.factor * value
 
     def elastic(self, p: Float[Array, "3"]) -> Float[Array, "3"]:
         """Force of the tissue on the ball without memory, N."""
@@ -131,7 +137,7 @@ class Surrogate(eqx.Module):
     def start(self, p: Float[Array, "3"]) -> State:
         """Rested tissue, the ball at p out of contact."""
         count = (0, 0) if self.memory is None else (len(self.memory.g), self.memory.stress.coefficients.shape[-1])
-        return State(jnp.zeros(count), jnp.zeros(count[1]), drag.start(p[:2]))
+        return State(jnp.zeros(count), jnp.zeros(count[1]), drag.start(p[:2]), jnp.ones(()))
 
     def tick(self, state: State, p: Float[Array, "3"], dt: Float[Array, ""]) -> tuple[State, Float[Array, "3"]]:
         """State and force `dt` seconds later with the ball's centre at p; the path between is straight."""
@@ -146,10 +152,12 @@ class Surrogate(eqx.Module):
             force = force + self._relaxed(p, self.memory.g @ gone)
             force = jnp.where(force[2] > 0, force, 0.0)  # tissue that lags behind a lifted ball does not pull it
         _, depth = self.place(p)
+        share = jnp.where(depth > 0, jnp.minimum(state.share, self.within(p)), 1.0)
         # Hertz: the slope of the force is 1.5 force / depth; friction needs no better
         stiffness = 1.5 * elastic[2] / jnp.clip(depth, 1e-9, self.depth)
         extra, grip = drag.tick(self.rub, state.grip, p[:2], depth, force[2], stiffness, self.radius)
-        return State(gone, now, grip), force + self.within(p) * extra
+        grip = grip._replace(deepest=jnp.where(share > 0, grip.deepest, -1.0))
+        return State(gone, now, grip, share), jnp.minimum(share, self.within(p)) * (force + extra)
 
     def _relaxed(self, p: Float[Array, "3"], load: Float[Array, " M"]) -> Float[Array, "3"]:
         """sum_m load_m de_m/dp; below the box it stays what it is at the floor."""
@@ -159,8 +167,7 @@ class Surrogate(eqx.Module):
         deeper = jnp.where(inside > 0, e + es * place[2] / 2, 0.0)
         tilt = jnp.stack([self.touch(xy, 0)[0], self.touch(xy, 1)[0]])
         aside = jnp.where(xy == p[:2], inside * jnp.stack([ex, ey]) + deeper * tilt, 0.0)
-        fade, slope = jax.value_and_grad(self.within)(p)
-        return jnp.append(fade * aside + slope[:2] * inside * e, -fade * deeper)
+        return jnp.append(aside, -deeper)
 
     def respond(self, time: Float[Array, " n"], path: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
         """Force on the ball along a path of its centre, N. Differentiable in path and tables."""

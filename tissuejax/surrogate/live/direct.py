@@ -5,6 +5,7 @@ would: slow motion raises the force (the tissue sees a faster hand), and must ne
 """
 
 import time
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -22,6 +23,7 @@ from tissuejax.tled.step import Drive, Machine, State, advance, machine
 from tissuejax.tled.step import start as begin
 
 CALL = 1e-3  # s of life a call, at least one step
+UNROLLED = 8  # steps of a call that are written out one after another: a loop costs a third of so small a step
 SLOWEST = 1.25  # times life that a scene must reach: the page and the machine want something too
 
 
@@ -43,19 +45,26 @@ def _machine(scene: Scene) -> tuple[Machine, State]:
     return made, begin(made)
 
 
-def _go(made: Machine, state: State, from_: Float[jax.Array, "3"], to: Float[jax.Array, "3"], steps: int):
-    def one(state, share):
-        centre = from_ + (to - from_) * share
-        state, felt = advance(made, state, Drive(centre, (to - from_) / steps, None))
+def _go(made: Machine, state: State, ends: Float[jax.Array, "2 3"], steps: int):
+    stride = (ends[1] - ends[0]) / steps
+
+    def one(state, k):
+        state, felt = advance(made, state, Drive(ends[0] + stride * k, stride, None))
         return state, felt.force
 
-    state, forces = jax.lax.scan(one, state, (jnp.arange(steps) + 1.0) / steps)
+    state, forces = jax.lax.scan(one, state, jnp.arange(steps) + 1.0, unroll=min(steps, UNROLLED))
     return state, jnp.mean(forces, 0)
 
 
 def _calling(made: Machine, steps: int):
-    """A call of so many steps. The machine is built in: handing its hundred arrays over would cost more than a step."""
-    return jax.jit(lambda state, a, b: _go(made, state, a, b, steps), compiler_options=COMPILER_OPTIONS)
+    """A call of so many steps. The machine is built in: handing its hundred arrays over would cost more than a step;
+    the state is given away, so that nothing is copied."""
+    go = partial(_go, made, steps=steps)
+    return jax.jit(go, compiler_options=COMPILER_OPTIONS, donate_argnums=0)
+
+
+def _copy(state: State) -> State:
+    return jax.tree.map(jnp.array, state)
 
 
 def direct_scene(matter: Matter, grid: Grid, place) -> Scene:
@@ -85,26 +94,26 @@ class Direct:
         self.step = float(self.scene.clock.step)
         self.steps = max(1, int(np.ceil(CALL / self.step - 1e-9)))
         self.call = self.steps * self.step
-        made, self.state = _machine(self.scene)
+        made, self.first = _machine(self.scene)
         self.go = _calling(made, self.steps)
-        self.first, self.force = self.state, np.zeros(3)
+        self.state, self.force = _copy(self.first), np.zeros(3)
         self.at = np.asarray(self.scene.probe.position[0], float)
 
     def rest(self) -> None:
         """Rested tissue."""
-        self.state, self.force = self.first, np.zeros(3)
+        self.state, self.force = _copy(self.first), np.zeros(3)
 
     def move(self, to: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
         """One call: the ball goes straight to `to`; the mean force on it, N.
 
         Raises:
-            UnstableSimulation: the state is no longer finite; it is set back to rest.
+            UnstableSimulation: the state is no longer finite; tissue and ball are set back to where they began.
         """
-        a, b = (np.asarray(x, np.float32) for x in (self.at, to))
-        self.state, force = self.go(self.state, a, b)
+        self.state, force = self.go(self.state, np.array([self.at, to], np.float32))
         self.force, self.at = np.asarray(force, float), np.asarray(to, float)
         if not np.isfinite(self.force).all():
             self.rest()
+            self.at = np.asarray(self.scene.probe.position[0], float)
             raise UnstableSimulation(
                 "the simulation broke down (pressed too fast or too deep) and was set back to rest"
             )
@@ -138,14 +147,22 @@ class Direct:
     def _without_contact(self, calls: int) -> float:
         bare = self.scene.put({"probe": None})
         made, state = _machine(bare)
-        zero = jnp.zeros(3, jnp.float32)
+        rest = np.zeros((2, 3), np.float32)
         go = _calling(made, self.steps)
-        go(state, zero, zero)
+        state, _ = go(state, rest)
         cpu = time.process_time()
         for _ in range(calls):
-            state, force = go(state, zero, zero)
-            force.block_until_ready()
+            state, force = go(state, rest)
+            np.asarray(force)
         return (time.process_time() - cpu) / calls
+
+
+def largest(pace: Pace, grid: Grid) -> Grid:
+    """The finest mesh that would keep up, going by `pace` on `grid`."""
+    # a step costs as its elements, and its length falls with their size: work grows as the fourth power of the fineness
+    share = (pace.times_life / SLOWEST) ** 0.25
+    fits = [max(2, int(share * n)) for n in grid.counts]
+    return grid._replace(counts=(2 * (fits[0] // 2), 2 * (fits[1] // 2), fits[2]))
 
 
 def keeps_up(pace: Pace, grid: Grid) -> Pace:
@@ -156,10 +173,7 @@ def keeps_up(pace: Pace, grid: Grid) -> Pace:
     """
     if pace.times_life >= SLOWEST:
         return pace
-    # a step costs as its elements, and its length falls with their size: work grows as the fourth power of the fineness
-    share = (pace.times_life / SLOWEST) ** 0.25
-    fits = tuple(max(2, int(share * n)) for n in grid.counts)
-    fits = (2 * (fits[0] // 2), 2 * (fits[1] // 2), fits[2])
+    fits = largest(pace, grid).counts
     raise InputError(
         f"{pace.elements} elements run at {pace.times_life:.2f} times life here, {SLOWEST:g} are needed, and slow "
         f"motion would falsify the force: take --mesh {fits[0]}x{fits[1]}x{fits[2]} or coarser, or a lower bulk modulus"

@@ -23,6 +23,8 @@ class Native:
         self.library.tj_fault.restype = ctypes.c_char_p
         self.library.tj_state_size.restype = ctypes.c_size_t
         self.library.tj_force.argtypes = [ctypes.c_void_p, ctypes.c_char_p, THREE, ctypes.c_double, THREE]
+        self.library.tj_seconds.restype = ctypes.c_double
+        self.library.tj_seconds.argtypes = [ctypes.c_void_p, ctypes.c_long]
         self.library.tj_close.argtypes = [ctypes.c_void_p]
         with tempfile.TemporaryDirectory() as folder:
             path = write(surrogate, Path(folder) / "model.tjf")
@@ -39,6 +41,10 @@ class Native:
         force = THREE()
         self.library.tj_force(self.model, self.state, THREE(*p), dt, force)
         return np.array(force)
+
+    def seconds(self, count: int = 20_000) -> float:
+        """CPU time of one force within C, s."""
+        return float(self.library.tj_seconds(self.model, count))
 
     def __del__(self):
         if getattr(self, "model", None):

@@ -33,6 +33,7 @@ typedef struct tj_model tj_model;
 typedef struct {
     double gone[TJ_TERMS][TJ_MODES], now[TJ_MODES]; /* stress modes relaxed, and as they are */
     double stretch[2], stiffness, at[2], deepest;   /* friction and adhesion */
+    double share;                                   /* of the force that is left: falls beyond the sides of the box */
     int started;
     double depth;                                   /* of the last tick, below first contact, m */
 } tj_state;
@@ -132,6 +133,7 @@ TJ_API void tj_rest(const tj_model *model, tj_state *state) {
     memset(state, 0, sizeof *state);
     state->deepest = -1;
     state->depth = -1;
+    state->share = 1;
 }
 
 static void tj__basis(double u, double per, double b[4], double d[4]) {
@@ -164,18 +166,42 @@ static void tj__ask(const tj__table *t, int axes, int rows, const double at[3], 
         for (i = 0; i < rows; i++) out[i][0] = r[i];
         return;
     }
-    for (i = 0; i < rows; i++) memset(out[i], 0, (size_t)M * sizeof(double));
+    memset(out[0], 0, (size_t)M * sizeof(double)); /* of many values only the values are asked here, see tj__loaded */
     for (i = 0; i < 4; i++)
         for (j = 0; j < 4; j++) {
-            double v = b[0][i] * b[1][j], vx = d[0][i] * b[1][j], vy = b[0][i] * d[1][j];
+            double v = b[0][i] * b[1][j];
             const double *c = t->c + (((size_t)(first[0] + i) * t->n[1] + first[1] + j) * t->n[2] + first[2]) * M;
             for (l = 0; l < deep; l++, c += M) {
-                double p = v * b[2][l], px = vx * b[2][l], py = vy * b[2][l], q = v * d[2][l];
-                if (rows == 1) for (m = 0; m < M; m++) out[0][m] += p * c[m];
-                else for (m = 0; m < M; m++) {
-                    out[0][m] += p * c[m]; out[1][m] += px * c[m]; out[2][m] += py * c[m]; out[3][m] += q * c[m];
-                }
+                double p = v * b[2][l];
+                for (m = 0; m < M; m++) out[0][m] += p * c[m];
             }
+        }
+}
+
+/* Value and slopes by x, y, s of a table over x, y, s whose M values are taken together with these weights first. */
+static void tj__loaded(const tj__table *t, const double at[3], const double load[TJ_MODES], double out[4]) {
+    double b[3][4], d[3][4];
+    int first[3], i, j, l, m, a, M = t->m;
+    for (a = 0; a < 3; a++) {
+        double x = (at[a] - t->origin[a]) * t->per[a];
+        int k = (int)floor(x);
+        first[a] = k = k < 0 ? 0 : k > t->n[a] - 4 ? t->n[a] - 4 : k;
+        tj__basis(x - k, t->per[a], b[a], d[a]);
+    }
+    out[0] = out[1] = out[2] = out[3] = 0;
+    for (i = 0; i < 4; i++)
+        for (j = 0; j < 4; j++) {
+            const double *c = t->c + (((size_t)(first[0] + i) * t->n[1] + first[1] + j) * t->n[2] + first[2]) * M;
+            double p = 0, q = 0;
+            for (l = 0; l < 4; l++, c += M) {
+                double w[4] = {0, 0, 0, 0}, sum; /* four sums side by side: the processor adds them at once */
+                for (m = 0; m + 4 <= M; m += 4)
+                    for (a = 0; a < 4; a++) w[a] += load[m + a] * c[m + a];
+                for (sum = w[0] + w[1] + w[2] + w[3]; m < M; m++) sum += load[m] * c[m];
+                p += b[2][l] * sum; q += d[2][l] * sum;
+            }
+            out[0] += b[0][i] * b[1][j] * p; out[1] += d[0][i] * b[1][j] * p; out[2] += b[0][i] * d[1][j] * p;
+            out[3] += b[0][i] * b[1][j] * q;
         }
 }
 
@@ -185,7 +211,7 @@ static double tj__pull(double gap, double reach) {
     return reach * (2.718281828459045 - (1 + g) * exp(1 - g));
 }
 
-static void tj__rub(const tj_model *m, tj_state *s, const double p[3], double depth, double stiff, double fade, double f[3]) {
+static void tj__rub(const tj_model *m, tj_state *s, const double p[3], double depth, double stiff, double f[3]) {
     double normal = f[2] > 0 ? f[2] : 0, extra[3] = {0, 0, 0};
     if (m->strength > 0) {
         double near = depth < 0 ? -depth : 0, in = depth > 0 ? depth : 0;
@@ -194,7 +220,7 @@ static void tj__rub(const tj_model *m, tj_state *s, const double p[3], double de
             double bonds = tj__pull(near + (s->deepest - in) / 2, m->reach) - tj__pull(near, m->reach);
             extra[2] = -6.283185307179586 * m->radius * m->strength * bonds;
         }
-        if (near > 5 * m->reach) s->deepest = -1;
+        if (near > 5 * m->reach || s->share <= 0) s->deepest = -1;
     }
     if (m->friction > 0) {
         double k = 2.0 / 3 * stiff, keep, x, y, length, slid;
@@ -210,11 +236,11 @@ static void tj__rub(const tj_model *m, tj_state *s, const double p[3], double de
         extra[0] = -k * s->stretch[0]; extra[1] = -k * s->stretch[1];
     }
     s->at[0] = p[0]; s->at[1] = p[1];
-    f[0] += fade * extra[0]; f[1] += fade * extra[1]; f[2] += fade * extra[2];
+    f[0] += extra[0]; f[1] += extra[1]; f[2] += extra[2];
 }
 
 TJ_API void tj_force(const tj_model *m, tj_state *state, const double p[3], double dt, double f[3]) {
-    double at[3], t[6][TJ_MODES], z[3], beyond[2], r, fade = 1, slide[2] = {0, 0}, depth, inside, below, s, stiff = 0, D = m->depth;
+    double at[3], t[6][TJ_MODES], z[3], beyond[2], r, fade = 1, depth, inside, below, s, stiff = 0, D = m->depth;
     double free_[2];
     int a, k, i;
     f[0] = f[1] = f[2] = 0;
@@ -232,20 +258,19 @@ TJ_API void tj_force(const tj_model *m, tj_state *state, const double p[3], doub
     at[2] = s = sqrt(inside / D);
     r = sqrt(beyond[0] * beyond[0] + beyond[1] * beyond[1]) / 1e-3;
     if (r >= 1) fade = 0;
-    else if (r > 0) {
-        fade = 1 - r * r * r * (10 - 15 * r + 6 * r * r);
-        for (a = 0; a < 2; a++) slide[a] = -30 * r * (1 - r) * (1 - r) * beyond[a] / 1e-6;
-    }
+    else if (r > 0) fade = 1 - r * r * r * (10 - 15 * r + 6 * r * r);
+    /* what faded comes back only once the ball was lifted: no push outwards, and no work for nothing */
+    state->share = depth <= 0 ? 1 : fade < state->share ? fade : state->share;
+    if (state->share < fade) fade = state->share;
     if (depth > 0) {
-        double d15 = D * sqrt(D), s5 = s * s * s * s * s, up, energy;
+        double d15 = D * sqrt(D), s5 = s * s * s * s * s, up;
         tj__ask(&m->law, 3, 6, at, t);
         up = m->factor * d15 * s * s * s * (5 * t[0][0] + s * t[3][0]) / 2;
-        energy = m->factor * d15 * D * s5 * t[0][0] + below * up;
         for (a = 0; a < 2; a++) {
             double aside = m->factor * (d15 * D * s5 * t[1 + a][0] + below * d15 * (5 * t[1 + a][0] + t[4 + a][0]) / 2);
-            f[a] = -fade * free_[a] * (aside + up * z[1 + a]) - slide[a] * energy;
+            f[a] = -free_[a] * (aside + up * z[1 + a]);
         }
-        f[2] = fade * up;
+        f[2] = up;
         stiff = 1.5 * up / (inside > 1e-9 ? inside : 1e-9);
     }
     if (m->terms) {
@@ -261,17 +286,17 @@ TJ_API void tj_force(const tj_model *m, tj_state *state, const double p[3], doub
         }
         for (i = 0; i < M; i++) state->now[i] = m->factor * inside * t[0][i];
         if (depth > 0) {
-            double le = 0, lx = 0, ly = 0, ls = 0, deeper;
-            tj__ask(&m->strain, 3, 4, at, t);
-            for (i = 0; i < M; i++) { le += load[i] * t[0][i]; lx += load[i] * t[1][i]; ly += load[i] * t[2][i]; ls += load[i] * t[3][i]; }
-            deeper = le + ls * s / 2;
-            f[0] += fade * free_[0] * (inside * lx + deeper * z[1]) + slide[0] * inside * le;
-            f[1] += fade * free_[1] * (inside * ly + deeper * z[2]) + slide[1] * inside * le;
-            f[2] -= fade * deeper;
+            double e[4], deeper;
+            tj__loaded(&m->strain, at, load, e);
+            deeper = e[0] + e[3] * s / 2;
+            f[0] += free_[0] * (inside * e[1] + deeper * z[1]);
+            f[1] += free_[1] * (inside * e[2] + deeper * z[2]);
+            f[2] -= deeper;
         }
         if (!(f[2] > 0)) f[0] = f[1] = f[2] = 0;
     }
-    tj__rub(m, state, p, depth, stiff, fade, f);
+    tj__rub(m, state, p, depth, stiff, f);
+    for (a = 0; a < 3; a++) f[a] *= fade;
 }
 
 TJ_API void tj_box(const tj_model *m, double box[7]) {
