@@ -98,6 +98,9 @@ def test_sensitivity_of_a_result_and_of_a_published_material(capsys, tmp_path):
     assert code == 0
     assert set(record["local"]["values"]) == {"energy.C10", "energy.C20"}
     code, record = answer(capsys, "sensitivity", "--published", "in-vivo-1", "--samples", "16", "--out", out)
+    assert code == 2
+    assert "--force" in record["error"]
+    code, record = answer(capsys, "sensitivity", "--published", "in-vivo-1", "--samples", "16", "--out", out, "--force")
     assert code == 0
     assert len(record["local"]["directions"]) == 4
     assert (tmp_path / "fisher.png").exists()

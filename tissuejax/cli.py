@@ -1,7 +1,7 @@
 """The command line: one parser over all sub-commands, errors as one sentence and an exit code.
 
-0 done, 2 the input can't be used, 3 did not converge. With --json standard output carries one JSON object and nothing
-else.
+0 done, 2 the input can't be used, 3 did not converge, 4 a fit whose numbers should not be used as they are. With
+--json standard output carries one JSON object and nothing else.
 """
 
 import argparse

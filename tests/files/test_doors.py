@@ -131,19 +131,92 @@ def test_a_file_that_points_at_other_files_is_refused(tmp_path):
             read(mailed)
 
 
+def lab(folder, name="lab", cap=""):
+    """A table of two samples, neo-Hookean with mu 3 and 5 kPa, with a side file."""
+    rows = [f"{s},{l},{mu * (l - l**-2)}\n" for s, mu in (("a", 3), ("b", 5)) for l in (1, 1.1, 1.2, 1.3, 1.4)]
+    (folder / f"{name}.csv").write_text("specimen,stretch,stress\n" + "".join(rows))
+    (folder / f"{name}.toml").write_text(
+        f'file = "{name}.csv"\nsample = "{{specimen}}"\nrecording = "pull"\nexperiment = "uniaxial"\n[columns]\n'
+        'stretch = { column = "stretch" }\nnominal_stress = { column = "stress", unit = "kPa" }\n'
+    )
+    return str(folder / f"{name}.toml")
+
+
+def test_a_fit_that_should_not_be_used_is_exit_code_4(tmp_path, capsys):
+    held = ["--energy", "neo-hookean", "--bounds", "energy.mu=0:4 kPa", "--multistart", "1"]
+    file = lab(tmp_path)
+    assert main(["fit", f"{file}#a", *held, "--out", str(tmp_path / "a")]) == 0
+    assert main(["fit", f"{file}#b", *held, "--out", str(tmp_path / "b")]) == 4
+    assert "DON'T USE THESE NUMBERS AS THEY ARE: energy.mu ended at its upper bound" in capsys.readouterr().out
+    assert main(["fit", file, "--each", *held, "--out", str(tmp_path / "each"), "--json"]) == 4
+    told = json.loads(capsys.readouterr().out)["fits"]
+    assert told["a"]["suspect"] == ""
+    assert "upper bound" in told["b"]["suspect"]
+
+
+def test_gross_misfit_is_exit_code_4(tmp_path, capsys):
+    side = Path(lab(tmp_path))
+    side.write_text(side.read_text() + '[noise]\nnominal_stress = "1 Pa"\n')
+    table = tmp_path / "lab.csv"
+    table.write_text(table.read_text().replace("a,1.2,", "a,1.2,1"))  # 1.5 kPa has become 11.5
+    assert main(["fit", f"{side}#a", "--energy", "neo-hookean", "--multistart", "1", "--out", str(tmp_path / "f")]) == 4
+    assert "times the noise" in capsys.readouterr().out.splitlines()[2]
+
+
+def test_every_verb_has_a_folder_of_its_own(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    file = lab(tmp_path)
+    fit = ["fit", file, "--each", "--multistart", "1", "--energy"]
+    assert main([*fit, "neo-hookean"]) == 0
+    assert main([*fit, "mooney-rivlin", "--fix", "energy.C01=0"]) == 0
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"lab-fits-neo-hookean", "lab-fits-mooney-rivlin"}
+    there = str(tmp_path / "out" / "lab-fits-neo-hookean")
+    assert main([*fit, "mooney-rivlin", "--fix", "energy.C01=0", "--out", there]) == 2
+    assert main(["fit", f"{file}#a", "-e", "neo-hookean", "--out", f"{there}/b"]) == 2, "another sample's result"
+    compare = ["compare", f"{file}#a", "-e", "neo-hookean", "-e", "gent", "--multistart", "1", "--out"]
+    assert main([*compare, f"{there}/a"]) == 2, "its page would be overwritten"
+    assert main([*compare, "c"]) == 0
+    assert main(["compare", f"{file}#a", "-e", "neo-hookean", "-e", "yeoh", "--out", "c"]) == 2
+    profile = ["profile", f"{file}#a", "--points", "2", "--multistart", "1", "--energy"]
+    assert main([*profile, "neo-hookean", "--out", "p"]) == 0
+    capsys.readouterr()
+    assert main([*profile, "gent", "--out", "p"]) == 2
+    assert "profile of a with neo-hookean" in capsys.readouterr().err
+    made = ["simulate", "-e", "neo-hookean", "--path", "0:1 1:1.1", "--out", "s", "--set"]
+    assert main([*made, "energy.mu=1 kPa"]) == 0
+    assert main([*made, "energy.mu=2 kPa"]) == 2
+    assert main([*made, "energy.mu=2 kPa", "--force"]) == 0
+    campaign = ["campaign", "run", "k", file, "--energy"]
+    assert main([*campaign, "neo-hookean"]) == 0
+    assert main([*campaign, "neo-hookean"]) == 0
+    assert main([*campaign, "gent"]) == 2
+
+
+def test_a_study_runs_in_a_copy(tmp_path):
+    study = tmp_path / "fits" / "mine"
+    study.mkdir(parents=True)
+    (study / "study.py").write_text(
+        "def main(folder):\n    (folder / 'result.json').write_text('new')\n    return 'done'\n"
+    )
+    (study / "result.json").write_text("old")
+    assert main(["study", str(study), "--out", str(tmp_path / "copy")]) == 0
+    assert (study / "result.json").read_text() == "old"
+    assert (tmp_path / "copy" / "mine" / "result.json").read_text() == "new"
+
+
 def test_results_do_not_overwrite_each_other(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     argv = ["fit", ELASTIC, "--only", "tension", "--multistart", "1", "--energy"]
-    assert main([*argv, "neo-hookean"]) == 0
     assert main([*argv, "reduced-polynomial-2"]) == 0
+    assert main([*argv, "reduced-polynomial-3"]) == 0
     assert {p.name for p in (tmp_path / "out").iterdir()} == {
-        "demo-elastic-fit-neo-hookean",
         "demo-elastic-fit-reduced-polynomial-2",
+        "demo-elastic-fit-reduced-polynomial-3",
     }
-    assert main([*argv, "neo-hookean"]) == 0, "the same command may be given again"
-    there = str(tmp_path / "out" / "demo-elastic-fit-neo-hookean")
+    assert main([*argv, "reduced-polynomial-2"]) == 0, "the same command may be given again"
+    there = str(tmp_path / "out" / "demo-elastic-fit-reduced-polynomial-2")
     capsys.readouterr()
-    assert main([*argv, "reduced-polynomial-2", "--out", there]) == 2
+    assert main([*argv, "reduced-polynomial-3", "--out", there]) == 2
     assert "--force" in capsys.readouterr().err
     assert main(["diagnose", ELASTIC, "--energy", "neo-hookean", "--out", there]) == 2
-    assert main([*argv, "reduced-polynomial-2", "--out", there, "--force"]) == 0
+    assert main([*argv, "reduced-polynomial-3", "--out", there, "--force"]) == 0

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import ClassVar
 
 from tissuejax.campaign.run import begin, engines, go_on, status, table
+from tissuejax.campaign.store import PLAN, Store
 from tissuejax.campaign.task import Settings
 from tissuejax.commands.arguments import add_model, positive
 from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.outputs import WITH_A_PAGE
 from tissuejax.errors import InputError
 from tissuejax.progress import for_terminal
 from tissuejax.storage import write_text
@@ -52,6 +54,9 @@ Engines: serial, processes, dask (extra `cluster`). docs/cohort.md shows Slurm.
         parser.add_argument("--scheduler", metavar="ADDRESS", help="of Dask, e.g. tcp://login:8786")
         parser.add_argument("--limit", type=float, default=0.0, metavar="S", help="seconds a case may take (0: any)")
         parser.add_argument("--retries", type=int, default=1, metavar="N", help="of a case that died (default 1)")
+        parser.add_argument(
+            "--force", action="store_true", help="for run: put another plan in the place of that in FOLDER"
+        )
         parser.add_argument("--failed", action="store_true", help="do failed cases again")
 
     def run(self, given: argparse.Namespace) -> Reply:
@@ -65,6 +70,8 @@ Engines: serial, processes, dask (extra `cluster`). docs/cohort.md shows Slurm.
                 given.kind, given.energy, given.ogden_form, given.volumetric, tuple(given.effect), tuple(given.holdout),
                 positive(given.multistart, "--multistart"),
             )  # fmt: skip
+            if not given.force:
+                _refuse_another(given.folder, settings)
             begin(given.folder, given.files, settings, given.limit, given.retries)
         if given.action in ("run", "resume"):
             workers = positive(given.workers, "--workers")
@@ -77,6 +84,20 @@ Engines: serial, processes, dask (extra `cluster`). docs/cohort.md shows Slurm.
             told = status(given.folder)
             return Reply(told, _text(told))
         return _report(given.folder)
+
+
+def _refuse_another(folder: Path, settings: Settings) -> None:
+    for name in (n for n in WITH_A_PAGE if n != PLAN):
+        if (folder / name).is_file():
+            raise InputError(f"{folder}: holds another result ({name}); name another folder, or give --force")
+    if not (folder / PLAN).is_file():
+        return
+    there = {task.settings for task in Store(folder).planned()[0]}
+    if there - {settings}:
+        raise InputError(
+            f"{folder}: holds a campaign with other settings; go on with it by `campaign resume`, name another folder, "
+            "or give --force to plan anew (answers that are there stay)"
+        )
 
 
 def _text(told: dict) -> str:

@@ -13,7 +13,8 @@ class Reply:
     Attributes:
         record: for `--json`.
         text: for people.
-        code: exit code, 0 done or 3 did not converge (2, bad input, is raised as InputError).
+        code: exit code, 0 done, 3 did not converge, 4 done but not to be used as it is (2, bad input, is raised as
+            InputError).
     """
 
     record: dict

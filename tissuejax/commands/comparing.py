@@ -8,6 +8,7 @@ from typing import ClassVar
 from tissuejax import verbs
 from tissuejax.commands.arguments import add_fit, fit_options
 from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.outputs import add_out, folder, made
 from tissuejax.errors import InputError, TissueError, unknown
 from tissuejax.fitting.comparison import compare, name_of
 from tissuejax.progress import for_terminal
@@ -49,16 +50,19 @@ comparison.csv, report.html and the figures; a model that can't be fitted is lis
         parser.add_argument("--ogden-form", metavar="FORM", help="what Ogden constants mean")
         parser.add_argument("--volumetric", metavar="NAME", help="volumetric energy; left out: incompressible")
         add_fit(parser)
-        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="default: out/SAMPLE-compare")
+        add_out(parser, "out/SAMPLE-compare")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Fit or read, compare, write."""
         if all(name.endswith(".json") for name in given.files):
-            found = compare(_records(given.files))
+            records = _records(given.files)
+            found, named = compare(records), sorted(records)
+            out = folder(
+                given.out or Path("out") / f"{found.sample}-compare", "compare", found.sample, named, given.force
+            )
         else:
-            found = self._fitted(given)
-        out = given.out or Path("out") / f"{found.sample}-compare"
-        written = write_comparison(found, out)
+            found, out, named = self._fitted(given)
+        written = write_comparison(found, out, made("compare", found.sample, named))
         rows = lines(found)
         width = max(len(r["name"]) for r in rows) + 2
         text = [
@@ -95,7 +99,9 @@ comparison.csv, report.html and the figures; a model that can't be fitted is lis
                 model = verbs.material(energy, ogden_form=form, volumetric=given.volumetric, effects=effects)
                 models[" + ".join([energy, *effects])] = model.across(tuple(sample.recordings))
         _check_paths(given, models)
-        records, fits, failed = {}, {}, {}
+        named, records, fits, failed = sorted(models), {}, {}, {}
+        place = given.out or Path("out") / f"{sample.name}-compare"
+        out = folder(place, "compare", sample.name, named, given.force)
         with for_terminal().stage(f"fitting {len(models)} models to {sample.name}", len(models)) as stage:
             for name, model in models.items():
                 try:
@@ -104,7 +110,7 @@ comparison.csv, report.html and the figures; a model that can't be fitted is lis
                 except TissueError as error:
                     failed[name] = str(error)
                 stage.advance(note=name)
-        return compare(records, failed, fits)
+        return compare(records, failed, fits), out, named
 
 
 def _path(text: str) -> str:

@@ -7,7 +7,7 @@ from typing import ClassVar
 import equinox as eqx
 
 from tissuejax.commands.command import Command, Reply
-from tissuejax.commands.outputs import folder
+from tissuejax.commands.outputs import add_out, folder
 from tissuejax.diagnosis.diagnose import diagnose
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.errors import unknown
@@ -57,13 +57,12 @@ again. Material tests and cuts begin anew.
             "--only", action="append", default=[], metavar="NAME", help="diagnose this recording (repeat for more)"
         )
         parser.add_argument("--effect", action="append", metavar="NAME", help="try only these effects (repeat)")
-        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="default: out/SAMPLE-diagnosis-ENERGY")
-        parser.add_argument("--force", action="store_true", help="overwrite another result in --out")
+        add_out(parser, "out/SAMPLE-diagnosis-ENERGY")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Read, diagnose, write."""
         sample = _only(read(given.file), given.only, given.holdout)
-        out = folder(given.out, "diagnosis", sample.name, given.energy, (), given.force)
+        out = folder(given.out, "diagnosis", sample.name, [given.energy], given.force)
         found = diagnose(
             sample,
             given.energy,

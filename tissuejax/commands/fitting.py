@@ -1,21 +1,25 @@
 """`tissuejax fit`: parameters of a strain energy from recordings, with uncertainties, figures and a held-out check."""
 
 import argparse
+import csv
+import io
 from pathlib import Path
 from typing import ClassVar
 
 from tissuejax import verbs
 from tissuejax.commands.arguments import add_fit, add_model, fit_options
 from tissuejax.commands.command import Command, Reply
-from tissuejax.commands.outputs import folder
+from tissuejax.commands.outputs import add_out, folder, made, refuse_other
 from tissuejax.fitting.advice import suspect
 from tissuejax.fitting.result import Fit, described
+from tissuejax.model import Model
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read, read_all
 from tissuejax.report import sentences
 from tissuejax.report.page import write_fit
 from tissuejax.storage import write_text
 
+SUSPECT = 4  # exit code of a fit whose numbers should not be used as they are
 KEPT = "checkpoint.json"  # the last iterate of a fit of probings, until it has ended
 
 
@@ -43,8 +47,9 @@ given again (--out holds checkpoint.json until it has ended). All recordings sha
 site.
 --method stress-curve is the manual iteration of the source made automatic, for comparison.
 
-Exit code 0: done; 2: the input can't be used (the message says why); 3: the search did not converge (what was found is
-written all the same, with a warning on top).
+Exit code 0: done; 2: the input can't be used (the message says why); 3: the search did not converge; 4: it did, and the
+numbers should not be used as they are: a parameter at its bound, an energy that is unstable in the recorded range, or a
+misfit of several times the noise. With 3 and 4 what was found is written all the same, with the reason on top.
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
@@ -55,8 +60,7 @@ written all the same, with a warning on top).
         add_model(parser)
         add_fit(parser)
         parser.add_argument("--each", action="store_true", help="fit every sample of FILE for itself, numbers only")
-        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="default: out/SAMPLE-fit-ENERGY")
-        parser.add_argument("--force", action="store_true", help="overwrite another result in --out")
+        add_out(parser, "out/SAMPLE-fit-ENERGY, with --each out/FILE-fits-ENERGY")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Read, fit, write."""
@@ -66,8 +70,7 @@ written all the same, with a warning on top).
         model = verbs.material(
             given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
         ).across(tuple(sample.recordings))
-        effects = [e.name for e in model.effects]
-        out = folder(given.out, "fit", sample.name, described(model)["name"], effects, given.force)
+        out = folder(given.out, "fit", sample.name, _named(model), given.force)
         found = verbs.fit(
             sample, model, progress=for_terminal(), checkpoint=out / KEPT, **fit_options(given, model.parameters)
         )
@@ -75,28 +78,46 @@ written all the same, with a warning on top).
 
     def _each(self, given: argparse.Namespace) -> Reply:
         """Every sample of a file: result.json for each, one table of all parameters."""
-        samples, out = read_all(given.file), given.out or Path("out") / Path(given.file).stem
-        rows, code, progress = {}, 0, for_terminal()
+        samples = read_all(given.file)
+        plain = verbs.material(
+            given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
+        )
+        out = given.out or Path("out") / "-".join([Path(given.file).stem, "fits", *_named(plain)])
+        if not given.force:
+            for name in samples:
+                refuse_other(out / name, made("fit", name, _named(plain)))
+        rows, codes, progress = {}, [], for_terminal()
         with progress.stage(f"{given.energy} on {len(samples)} samples", len(samples)) as stage:
             for name, sample in samples.items():
-                model = verbs.material(
-                    given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
-                ).across(tuple(sample.recordings))
+                model = plain.across(tuple(sample.recordings))
                 found = verbs.fit(sample, model, **fit_options(given, model.parameters))
                 write_fit(found, out / name, pictures=False)
-                rows[name] = {"status": found.status, "chi2_per_dof": found.chi2_per_dof}
+                doubts = "; ".join(suspect(found))
+                rows[name] = {"status": found.status, "suspect": doubts, "chi2_per_dof": found.chi2_per_dof}
                 rows[name] |= {path: found.values[path] for path in found.free}
                 rows[name] |= {f"std {path}": found.std[path] for path in found.free}
-                code = max(code, 0 if found.converged else 3)
+                codes.append(_code(found))
                 stage.advance(note=name)
         columns = list(dict.fromkeys(column for row in rows.values() for column in row))
-        lines = [",".join(["sample", *columns])]
-        lines += [",".join([name, *(str(row.get(c, "")) for c in columns)]) for name, row in rows.items()]
-        table = write_text(out / "fits.csv", "\n".join(lines) + "\n")
-        good = sum(row["status"] == "converged" for row in rows.values())
-        return Reply(
-            {"fits": rows, "table": str(table)}, f"{good} of {len(rows)} samples converged; table {table}", code
-        )
+        text = io.StringIO()
+        writer = csv.DictWriter(text, ["sample", *columns])
+        writer.writeheader()
+        writer.writerows({"sample": name} | row for name, row in rows.items())
+        table = write_text(out / "fits.csv", text.getvalue())
+        told = f"{codes.count(0)} of {len(rows)} samples converged to numbers that can be used"
+        told += f", {codes.count(SUSPECT)} are suspect (column suspect)" if SUSPECT in codes else ""
+        told += f", {codes.count(3)} did not converge" if 3 in codes else ""
+        code = 3 if 3 in codes else max(codes, default=0)
+        return Reply({"fits": rows, "table": str(table)}, f"{told}; table {table}", code)
+
+
+def _named(model: Model) -> list[str]:
+    """Energy and effects, for the name of a folder."""
+    return [described(model)["name"], *(e.name for e in model.effects)]
+
+
+def _code(found: Fit) -> int:
+    return 3 if not found.converged else SUSPECT if suspect(found) else 0
 
 
 def reply(found: Fit, written: dict[str, Path]) -> Reply:
@@ -120,4 +141,4 @@ def reply(found: Fit, written: dict[str, Path]) -> Reply:
     )
     lines.append(f"data     {written['curves']}, {written['table']}")
     record = found.record() | {"suspect": doubts, "files": {name: str(path) for name, path in written.items()}}
-    return Reply(record, "\n".join(lines), 0 if found.converged else 3)
+    return Reply(record, "\n".join(lines), _code(found))

@@ -1,46 +1,92 @@
-"""Where results go: a folder for each verb, sample and model; nothing is overwritten that is something else."""
+"""Where results go: a folder for each verb, sample and model; nothing is overwritten that is something else.
 
+The record that a verb writes says under "made" what it is of. The same command may be given again; another one into the
+same folder is refused.
+"""
+
+import argparse
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from tissuejax.errors import InputError
 
+RECORDS = {  # the file in which a verb says what it made; those with a page share report.html
+    "fit": "result.json",
+    "diagnosis": "result.json",
+    "compare": "comparison.json",
+    "campaign": "campaign.json",
+    "sensitivity": "sensitivity.json",
+    "profile": "profiles.json",
+    "posterior": "posterior.json",
+}
+WITH_A_PAGE = ("result.json", "comparison.json", "campaign.json")
 
-def folder(
-    out: Path | None, verb: str, sample: str, energy: str, effects: Sequence[str] = (), force: bool = False
-) -> Path:
-    """The folder to write into: `out`, or out/SAMPLE-VERB-ENERGY by default.
 
-    The same command may be given again. A finished result of another verb, sample or model is not overwritten.
+def add_out(parser: argparse.ArgumentParser, default: str) -> None:
+    """--out and --force."""
+    parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help=f"default: {default}")
+    parser.add_argument("--force", action="store_true", help="overwrite another result in --out")
+
+
+def made(verb: str, sample: str, model: Sequence[str]) -> dict[str, Any]:
+    """What a record says of itself under "made"."""
+    return {"verb": verb, "sample": sample, "model": list(model)}
+
+
+def folder(out: Path | None, verb: str, sample: str, model: Sequence[str] = (), force: bool = False) -> Path:
+    """The folder to write into: `out`, or out/SAMPLE-VERB-MODEL by default.
 
     Args:
         out: as the user said, or None.
-        verb: "fit" or "diagnosis".
-        sample, energy, effects: what is computed.
+        verb: a key of `RECORDS`.
+        sample, model: what is computed: the energy and the effects, or whatever tells two results of a verb apart.
         force: overwrite whatever is there.
 
     Raises:
         InputError: the folder holds another result; says which, and what to do.
     """
-    place = out or Path("out") / "-".join([sample, verb, energy, *effects])
-    found = place / "result.json"
-    if force or not found.is_file():
-        return place
-    there, mine = _told(found), (verb, sample, energy, tuple(sorted(effects)) if verb == "fit" else ())
-    if there != mine:
-        what = "a result of another kind" if there is None else f"the {there[0]} of {there[1]} with {there[2]}"
-        raise InputError(f"{place}: holds {what}; name another folder with --out, or give --force to overwrite it")
+    place = out or Path("out") / "-".join([sample, verb, *model])
+    if not force:
+        refuse_other(place, made(verb, sample, model))
     return place
 
 
-def _told(path: Path) -> tuple[str, str, str, tuple[str, ...]] | None:
-    """Verb, sample, energy and effects of a result.json, or None where it is none of ours."""
+def refuse_other(place: Path, mine: dict[str, Any]) -> None:
+    """Refuse a folder whose results this verb would overwrite and that are of something else.
+
+    Raises:
+        InputError: says what is there, and what to do.
+    """
+    own = RECORDS[mine["verb"]]
+    for name in WITH_A_PAGE if own in WITH_A_PAGE else (own,):
+        path = place / name
+        if not path.is_file():
+            continue
+        there = _told(path)
+        if there != _plain(mine):
+            what = "a result of another kind"
+            if there is not None:
+                what = f"the {there[0]} of {there[1]}" + (f" with {' + '.join(there[2])}" if there[2] else "")
+            raise InputError(f"{place}: holds {what}; name another folder with --out, or give --force to overwrite it")
+
+
+def _plain(told: dict[str, Any]) -> tuple[str, str, tuple[str, ...]]:
+    first, *rest = told["model"] or [""]
+    return told["verb"], told["sample"], (first, *sorted(rest)) if told["model"] else ()
+
+
+def _told(path: Path) -> tuple[str, str, tuple[str, ...]] | None:
+    """Verb, sample and model of a record, or None where it is none of ours."""
     try:
         record = json.loads(path.read_text("utf-8"))
+        if "made" in record:
+            return _plain(record["made"])
         energy = record["energy"]
         energy = energy["name"] if isinstance(energy, dict) else energy
-        verb = "diagnosis" if "verdict" in record else "fit"
-        return verb, record["sample"], energy, tuple(sorted(record["effects"])) if verb == "fit" else ()
-    except (OSError, ValueError, KeyError, TypeError):
+        if "verdict" in record:
+            return "diagnosis", record["sample"], (energy,)
+        return "fit", record["sample"], (energy, *sorted(record["effects"]))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None

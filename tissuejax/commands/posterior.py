@@ -1,7 +1,6 @@
 """`tissuejax posterior`: draws of the parameters of a material test, by Laplace or NUTS, and the evidence."""
 
 import argparse
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -9,7 +8,9 @@ import numpy as np
 from tissuejax import verbs
 from tissuejax.commands.arguments import add_fit, add_model, fit_options, positive
 from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.outputs import add_out, folder, made
 from tissuejax.errors import unknown
+from tissuejax.fitting.result import described
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read
 from tissuejax.report.page import write_figures
@@ -46,7 +47,7 @@ Needs the extra `bayes`: pip install 'tissuejax[bayes]'.
         parser.add_argument("--draws", type=int, default=1000, metavar="N", help="a chain (default 1000)")
         parser.add_argument("--chains", type=int, default=4, metavar="N", help="of nuts (default 4)")
         parser.add_argument("--evidence", action="store_true", help="ln Z by tempered sampling")
-        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="default: out/SAMPLE-posterior")
+        add_out(parser, "out/SAMPLE-posterior-ENERGY")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Fit, draw, write."""
@@ -60,6 +61,8 @@ Needs the extra `bayes`: pip install 'tissuejax[bayes]'.
         model = verbs.material(
             given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
         ).across(tuple(sample.recordings))
+        named = [described(model)["name"], *(e.name for e in model.effects)]
+        out = folder(given.out, "posterior", sample.name, named, given.force)
         found = verbs.fit(sample, model, progress=for_terminal(), **fit_options(given, model.parameters))
         target, mode = target_of(found), np.array([found.values[p] for p in found.free])
         draws = positive(given.draws, "--draws")
@@ -67,7 +70,7 @@ Needs the extra `bayes`: pip install 'tissuejax[bayes]'.
             told = laplace(target, mode, draws, given.seed)
         else:
             told = nuts(target, mode, draws, positive(given.chains, "--chains"), seed=given.seed)
-        out, record = given.out or Path("out") / f"{sample.name}-posterior", told.record()
+        record = {"made": made("posterior", sample.name, named)} | told.record()
         if given.evidence:
             z = evidence(target, seed=given.seed)
             record["evidence"] = {"log_evidence": z.log_evidence, "std": z.std, "rungs": z.rungs}

@@ -2,14 +2,15 @@
 
 import argparse
 import math
-from pathlib import Path
 from typing import ClassVar
 
 from tissuejax import verbs
 from tissuejax.commands.arguments import add_fit, add_model, fit_options
 from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.outputs import add_out, folder, made
 from tissuejax.errors import unknown
 from tissuejax.fitting.profile import profile
+from tissuejax.fitting.result import described
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read
 from tissuejax.report.page import write_figures
@@ -43,7 +44,7 @@ no parabola; where it does not close, the data do not bound the parameter on tha
             "--path", action="append", metavar="PATH", help="profile this one (repeat; default: all free)"
         )
         parser.add_argument("--points", type=int, default=6, metavar="N", help="on either side (default 6)")
-        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="default: out/SAMPLE-profile")
+        add_out(parser, "out/SAMPLE-profile-ENERGY")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Fit, profile, draw."""
@@ -51,6 +52,8 @@ no parabola; where it does not close, the data do not bound the parameter on tha
         model = verbs.material(
             given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
         ).across(tuple(sample.recordings))
+        named = [described(model)["name"], *(e.name for e in model.effects)]
+        out = folder(given.out, "profile", sample.name, named, given.force)
         found = verbs.fit(sample, model, progress=for_terminal(), **fit_options(given, model.parameters))
         paths = tuple(given.path or found.free)
         for path in paths:
@@ -61,7 +64,6 @@ no parabola; where it does not close, the data do not bound the parameter on tha
             for path in paths:
                 profiles.append(profile(found, path, points=given.points))
                 stage.advance(note=path)
-        out = given.out or Path("out") / f"{sample.name}-profile"
         told = {
             p.path: {
                 "value": found.values[p.path],
@@ -73,7 +75,10 @@ no parabola; where it does not close, the data do not bound the parameter on tha
             }
             for p in profiles
         }
-        files = {"result": write_json(out / "profiles.json", {"profiles": told, "warnings": found.warnings})}
+        mine = made("profile", sample.name, named)
+        files = {
+            "result": write_json(out / "profiles.json", {"made": mine, "profiles": told, "warnings": found.warnings})
+        }
         files |= write_figures(Profiles(found, tuple(profiles)), out)
         lines = [f"{'parameter':<36}{'estimate':>12}  {'95 % by profile':<28}{'by standard error'}"]
         for path, t in told.items():

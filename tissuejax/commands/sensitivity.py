@@ -10,6 +10,8 @@ import numpy as np
 from tissuejax import verbs
 from tissuejax.commands.arguments import positive, ranges
 from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.outputs import add_out, folder, made
+from tissuejax.energies.catalogue import name_of
 from tissuejax.energies.published import published
 from tissuejax.errors import InputError
 from tissuejax.experiments.predictor import predictor
@@ -69,7 +71,7 @@ Ranges of the Sobol indices are 20 % either side of each value unless given: --r
         parser.add_argument(
             "--samples", type=int, default=256, metavar="N", help="base samples of Sobol, a power of two (256)"
         )
-        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="default: out/NAME-sensitivity")
+        add_out(parser, "out/NAME-sensitivity-ENERGY")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Local, Fisher, Sobol; figures and sensitivity.json."""
@@ -78,17 +80,20 @@ Ranges of the Sobol indices are 20 % either side of each value unless given: --r
         for option, share in (("--noise", given.noise), ("--spread", given.spread)):
             if not 0 < share < float("inf"):
                 raise InputError(f"{option} {share}: it must be a share above zero, such as 0.02")
-        model, values, made, level, paths = _published(given) if given.published else _fitted(given)
-        out = given.out or Path("out") / f"{given.published or made.sample.name}-sensitivity"
-        found = local(made, values, paths, level)
-        declared = made.model.parameters
+        model, values, posed, level, paths = _published(given) if given.published else _fitted(given)
+        of = posed.sample.name if given.published is None else given.published
+        energy = [] if given.published else [name_of(model.energy), *(e.name for e in model.effects)]
+        out = folder(given.out, "sensitivity", of, energy, given.force)
+        found = local(posed, values, paths, level)
+        declared = posed.model.parameters
         bounds = {p: _around(values[p], given.spread, declared[p]) for p in paths} | ranges(
             given.range, declared, "--range"
         )
-        written, record = write_figures(found, out), {"local": found.record()}
+        written = write_figures(found, out)
+        record = {"made": made("sensitivity", of, energy), "local": found.record()}
         if len(bounds) > 1:
             indices = sobol(
-                made, values, bounds, n=positive(given.samples, "--samples"), batched=made.name == "homogeneous"
+                posed, values, bounds, n=positive(given.samples, "--samples"), batched=posed.name == "homogeneous"
             )
             record["sobol"] = indices.record()
             written = written | write_figures(indices, out)

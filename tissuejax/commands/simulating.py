@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.outputs import add_out
 from tissuejax.commands.results import Known, add_source, known
 from tissuejax.energies.catalogue import volumetric
 from tissuejax.errors import InputError
@@ -85,7 +86,7 @@ def add_output(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-pictures", action="store_true", help="no picture or animation of the states")
     parser.add_argument("--compression", type=float, metavar="F", help="of a probing: run F times faster than life")
     parser.add_argument("--mesh", choices=["graded", "file"], help="of a probing: the file's mesh or a graded one")
-    parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="default: out/NAME-simulated")
+    add_out(parser, "out/NAME-simulated or out/NAME-predicted")
 
 
 def simulated(
@@ -93,6 +94,9 @@ def simulated(
     noise: float | None = None, measured: bool = False,
 ) -> Reply:  # fmt: skip
     """Predict `names` of a sample and write recording file, tables and states; `measured` puts the data beside."""
+    target = out / f"{sample.name}.h5"
+    if target.exists() and not given.force:
+        raise InputError(f"{target}: is there already; name another folder with --out, or give --force to overwrite it")
     assumed: list[str] = []
     probings = [n for n in names if sample.recordings[n].experiment == "probing"]
     options = {}
@@ -111,7 +115,7 @@ def simulated(
     predicted = made.predict(values)
     told = as_measured(predicted, sample.recordings, noise, getattr(given, "seed", 0))
     kept = Sample(sample.name, told, sample.geometry, sample.density, sample.gravity, f"predicted by {of.name}", "")
-    files = {"recording": write(kept, out / f"{sample.name}.h5")}
+    files = {"recording": write(kept, target)}
     for name, recording in told.items():
         paths = write_table(recording, out, sample.recordings[name] if measured else None)
         files |= {p.stem: p for p in paths}

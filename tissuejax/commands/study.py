@@ -1,7 +1,9 @@
 """`tissuejax study`: re-run the studies on real recordings in `fits/`, each by its own scripts."""
 
 import argparse
+import os
 import runpy
+import shutil
 import time
 from pathlib import Path
 from typing import ClassVar
@@ -27,6 +29,10 @@ default ../shared beside the checkout.
   tissuejax study fits/rubber
   tissuejax study fits/beef --only diagnosis
   tissuejax study fits/*                   all of them
+  tissuejax study fits/rubber --out out/studies     in a copy, out/studies/rubber, so that nothing here is overwritten
+
+Without --out the numbers and figures in FOLDER are overwritten. A study that goes on from what it finds (result.json)
+does so in the copy too.
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
@@ -34,6 +40,7 @@ default ../shared beside the checkout.
         parser.add_argument(
             "folders", nargs="+", type=Path, metavar="FOLDER", help="folders with a study.py or diagnosis.py"
         )
+        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="run in a copy here; default: in place")
         parser.add_argument("--only", choices=[Path(s).stem for s in SCRIPTS], help="one of the two scripts")
 
     def run(self, given: argparse.Namespace) -> Reply:
@@ -46,10 +53,26 @@ default ../shared beside the checkout.
                 "a study is a folder such as fits/rubber"
             )
         done = {}
+        if given.out is not None:
+            found = [_copied(script, given.out) for script in found]
         for script in found:
             begun = time.perf_counter()
             answer = runpy.run_path(str(script))["main"](script.parent)
             name = str(script.parent if script.name == SCRIPTS[0] else script)
             done[name] = {"seconds": time.perf_counter() - begun, "answer": answer}
         lines = [f"{name}: {d['seconds']:.0f} s, {d['answer']}" for name, d in done.items()]
+        lines += (
+            [] if given.out else ["", "numbers and figures in these folders were overwritten; --out runs in a copy"]
+        )
         return Reply({"studies": done}, "\n".join(lines))
+
+
+def _copied(script: Path, out: Path) -> Path:
+    """The same script in a copy of its folder; recordings are still found where the checkout has them."""
+    folder, target = script.parent.resolve(), out / script.parent.resolve().name
+    if not target.exists():
+        shutil.copytree(folder, target, ignore=shutil.ignore_patterns("__pycache__"))
+    beside = next((p / "shared" for p in folder.parents if (p / "shared").is_dir()), None)
+    if beside is not None:
+        os.environ.setdefault("TISSUEJAX_SHARED", str(beside))
+    return target / script.name

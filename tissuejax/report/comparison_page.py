@@ -3,6 +3,7 @@
 import csv
 import io
 from pathlib import Path
+from typing import Any
 
 from tissuejax.fitting.comparison import Comparison
 from tissuejax.report.comparison_table import lines, verdict
@@ -10,7 +11,7 @@ from tissuejax.report.page import figures, render
 from tissuejax.storage import write_bytes, write_json, write_text
 
 
-def write_comparison(found: Comparison, out: Path) -> dict[str, Path]:
+def write_comparison(found: Comparison, out: Path, made: dict[str, Any] | None = None) -> dict[str, Path]:
     """comparison.json, comparison.csv, report.html and the figures; their paths by name."""
     rows, drawn = lines(found), figures(found)
     table = io.StringIO()
@@ -29,7 +30,7 @@ def write_comparison(found: Comparison, out: Path) -> dict[str, Path]:
         figures=drawn,
     )
     return {
-        "result": write_json(out / "comparison.json", found.record()),
+        "result": write_json(out / "comparison.json", {"made": made} | found.record()),
         "table": write_text(out / "comparison.csv", table.getvalue()),
         **{f["name"]: write_bytes(out / f"{f['name']}.png", f["png"]) for f in drawn},
         "page": write_text(out / "report.html", page),
