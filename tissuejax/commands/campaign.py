@@ -3,6 +3,8 @@
 import argparse
 import csv
 import io
+import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import ClassVar
 
@@ -16,7 +18,7 @@ from tissuejax.errors import InputError
 from tissuejax.progress import for_terminal
 from tissuejax.storage import write_text
 
-ACTIONS = ("run", "resume", "status", "report")
+ACTIONS = ("run", "resume", "status", "report", "population")
 
 
 class Campaign(Command):
@@ -34,13 +36,18 @@ recordings, the settings and the code: what is there is not done again, a killed
   tissuejax campaign status out/ecoflex
   tissuejax campaign resume out/ecoflex --engine dask --scheduler tcp://login:8786      --failed does failures again
   tissuejax campaign report out/ecoflex                                                 cases.csv and a page
+  tissuejax campaign population out/ecoflex --group "^(EF\\d+)"                          mean, spreads, a new specimen
+
+population takes the fits of a campaign together: typical values, the spread between specimens and between groups of
+them (the part of a sample's name that --group matches: an animal, a day), and where a new specimen should lie. It needs
+the extra `bayes`.
 
 Engines: serial, processes, dask (extra `cluster`). docs/cohort.md shows Slurm.
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
         """ACTION FOLDER [FILE ...] and settings."""
-        parser.add_argument("action", choices=ACTIONS, help="run, resume, status or report")
+        parser.add_argument("action", choices=ACTIONS, help=", ".join(ACTIONS))
         parser.add_argument("folder", type=Path, metavar="FOLDER", help="of the campaign")
         parser.add_argument("files", nargs="*", metavar="FILE", help="for run: recording files or side files")
         parser.add_argument("--kind", default="fit", choices=["fit", "diagnose"], help="what is asked (default fit)")
@@ -59,8 +66,12 @@ Engines: serial, processes, dask (extra `cluster`). docs/cohort.md shows Slurm.
         )
         parser.add_argument("--failed", action="store_true", help="do failed cases again")
 
+        parser.add_argument("--group", metavar="PATTERN", help="for population: what of a sample's name is its group")
+
     def run(self, given: argparse.Namespace) -> Reply:
-        """One of the four actions."""
+        """One of the actions."""
+        if given.action == "population":
+            return _population(given.folder, given.group)
         if given.action == "run":
             if not given.files or given.energy is None:
                 raise InputError("campaign run needs FILEs and --energy")
@@ -118,3 +129,42 @@ def _report(folder: Path) -> Reply:
     files = {"table": write_text(folder / "cases.csv", text.getvalue())} | write_cohort(rows, status(folder), folder)
     told = status(folder) | {"files": {n: str(p) for n, p in files.items()}}
     return Reply(told, "\n".join([_text(told), *(str(p) for p in files.values())]))
+
+
+def _population(folder: Path, pattern: str | None) -> Reply:
+    from tissuejax.campaign.population import estimates, population
+    from tissuejax.report.population_page import write_population
+
+    store = Store(folder)
+    rows = {t.sample: row["answer"] for t, row in store.rows(store.planned()[0]) if row and row["status"] == "done"}
+    fits = {name: answer for name, answer in rows.items() if "correlation" in answer}
+    if not fits:
+        raise InputError(f"{folder}: no finished fits (a population is one of fits, not of diagnoses)")
+    found = population(estimates(fits, None if pattern is None else _groups(fits, pattern)))
+    record = found.record()
+    files = write_population(found, folder / "population")
+    lines = [f"{record['specimens']} specimens" + (f" in {len(record['groups'])} groups" if record["groups"] else "")]
+    for path in found.of.paths:
+        typical, new = record["typical"][path], record["new_specimen"][path]["95 %"]
+        spread = record["between_specimens"][path]["median"]
+        among = record["between_groups"].get(path, {}).get("median")
+        how = " %" if record["logarithm"][path] else ""
+        factor = 100 if how else 1
+        lines.append(
+            f"  {path:<30}typical {typical['median']:.4g}, spread between specimens {factor * spread:.3g}{how}"
+            + (f", between groups {factor * among:.3g}{how}" if among is not None else "")
+            + f"; a new specimen {new[0]:.4g} to {new[1]:.4g} {found.of.units[found.of.paths.index(path)]}"
+        )
+    lines += [str(path) for path in files.values()]
+    return Reply(record | {"files": {n: str(p) for n, p in files.items()}}, "\n".join(lines))
+
+
+def _groups(names: Iterable[str], pattern: str) -> dict[str, str]:
+    try:
+        rule = re.compile(pattern)
+    except re.error as error:
+        raise InputError(f"--group {pattern}: not a regular expression ({error})") from error
+    found = {name: rule.search(name) for name in names}
+    if lost := [name for name, hit in found.items() if hit is None]:
+        raise InputError(f"--group {pattern}: matches nothing in {', '.join(lost[:3])}; it has to match every sample")
+    return {name: hit.group(1) if rule.groups else hit.group(0) for name, hit in found.items()}

@@ -1,0 +1,165 @@
+"""Do the intervals hold what they promise? Simulation-based calibration of every kind, on closed-form tension tests.
+
+Truths are drawn from a prior, data from the textbook's formula written here (not the package's), and each truth is
+ranked among the draws of its posterior: ranks of a calibrated posterior are uniform (Talts et al. 2018,
+arXiv:1804.06788). Intervals and bands are counted: how often they hold the truth, and a value measured anew.
+
+tissuejax study fits/intervals
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import equinox as eqx
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.stats import binom, chi2
+
+import tissuejax as tj
+from tissuejax.fitting.bands import half_width, prediction_std
+from tissuejax.fitting.least_squares import descend, fit
+from tissuejax.fitting.posterior import laplace, nuts_draws, nuts_runner
+from tissuejax.fitting.profile import profile
+from tissuejax.fitting.result import Fit
+from tissuejax.fitting.target import Target
+from tissuejax.recordings.recording import Channel, Recording, Sample
+from tissuejax.storage import write_figure, write_json
+
+DATA_SETS, DRAWS, BINS, SIGMA, SEED = 200, 99, 10, 40.0, 11
+STRETCH = np.linspace(0.75, 1.3, 24)
+PRIOR = {"energy.mu": (1500.0, 350.0), "energy.b": (2.0, 0.7)}
+FEW = 3  # every third sample: eight, for two parameters and a noise that was not recorded
+
+
+def stress(mu: float, b: float) -> np.ndarray:
+    """Demiray 1972: nominal stress in uniaxial tension, mu exp(b (I1 - 3)) (l - l^-2)."""
+    l = STRETCH
+    return mu * np.exp(b * (l**2 + 2 / l - 3)) * (l - l**-2)
+
+
+def data(values, every: int = 1, std: float | None = SIGMA) -> Sample:
+    """A sample with these measured values."""
+    time = np.arange(float(len(STRETCH)))[::every]
+    inputs, channel = {"time": time, "stretch": STRETCH[::every]}, Channel(time, values[::every], "Pa", std)
+    return Sample("sbc", {"pull": Recording("pull", "uniaxial", inputs, {"nominal_stress": channel}, {})})
+
+
+def truths(rng: np.random.Generator) -> np.ndarray:
+    """Parameters drawn from the prior, positive ones."""
+    means, stds = (np.array([PRIOR[p][k] for p in PRIOR]) for k in (0, 1))
+    while True:
+        truth = means + stds * rng.normal(size=len(PRIOR))
+        if (truth > 0).all():
+            return truth
+
+
+def posterior_ranks(rng: np.random.Generator) -> tuple[dict, dict, float]:
+    """Ranks and covered truths of Laplace and NUTS, and the largest k-hat; the noise is recorded."""
+    means = np.array([m for m, _ in PRIOR.values()])
+    base = tj.fit(data(stress(*means)), "demiray", multistart=1, priors=PRIOR).problem
+    target = Target(base)
+    run = nuts_runner(target, 4 * DRAWS, 1, 200)
+    ranks, covered, khat = {"Laplace": [], "NUTS": []}, {"Laplace": [], "NUTS": []}, []
+    for k in range(DATA_SETS):
+        truth = truths(rng)
+        measured = stress(*truth) + SIGMA * rng.normal(size=len(STRETCH))
+        posed = replace(base, predictor=eqx.tree_at(lambda p: p.sample, base.predictor, data(measured)))
+        best = descend(posed, dict(base.start) | dict(zip(base.free, means)))
+        own = Target(posed)
+        own.many, own.density = target.many, target.density  # compiled once: data is an argument
+        found = laplace(own, best.y, 1500, seed=k)
+        khat.append(found.checks["khat"])
+        y, _ = nuts_draws(own, best.y, own.data, 4 * DRAWS, 1, 200, k, run)
+        all_draws = {"Laplace": found.flat, "NUTS": own.parameters(y[0])}
+        few = {"Laplace": found.flat[:: len(found.flat) // DRAWS][:DRAWS], "NUTS": own.parameters(y[0][3::4])[:DRAWS]}
+        for method, x in few.items():
+            ranks[method].append((x < truth).sum(0))
+            low, high = np.quantile(all_draws[method], [0.025, 0.975], axis=0)
+            covered[method].append((low < truth) & (truth < high))
+    return ranks, covered, float(np.max(khat))
+
+
+def counted(rng: np.random.Generator, every: int, std: float | None) -> dict[str, list]:
+    """Truths in intervals by standard error and by profile; curve and newly measured values in the band."""
+    means = np.array([m for m, _ in PRIOR.values()])
+    base = tj.fit(data(stress(*means), every, std), "demiray", multistart=1).problem
+    found: dict[str, list] = {"standard error": [], "profile": [], "band of new values": []}
+    for _ in range(DATA_SETS):
+        truth = truths(rng)
+        clean = stress(*truth)
+        measured = clean + SIGMA * rng.normal(size=len(STRETCH))
+        posed = replace(base, predictor=eqx.tree_at(lambda p: p.sample, base.predictor, data(measured, every, std)))
+        best: Fit = fit(posed, start=dict(base.start) | dict(zip(base.free, means)), multistart=1)
+        inside = [low < x < high for x, (low, high) in zip(truth, best.intervals.values(), strict=True)]
+        found["standard error"].append(inside)
+        ends = [profile(best, path, points=4).interval for path in best.free]
+        found["profile"].append([low < x < high for x, (low, high) in zip(truth, ends, strict=True)])
+        spread = prediction_std(best.problem, best.values, best.uncertainty, ("pull",))["pull"]["nominal_stress"]
+        half = half_width(spread, best.problem.noise.std["pull/nominal_stress"], best.uncertainty)
+        again = clean[::every] + SIGMA * rng.normal(size=len(spread))
+        predicted = np.asarray(best.predictions["pull"].channels["nominal_stress"].values)
+        found["band of new values"].append(np.abs(again - predicted) < half)
+    return found
+
+
+def main(folder: Path) -> str:
+    """Ranks and coverages; result.json and a figure."""
+    rng = np.random.default_rng(SEED)
+    ranks, covered, khat = posterior_ranks(rng)
+    record = {"data_sets": DATA_SETS, "draws": DRAWS, "khat_largest": khat, "ranks": {}, "coverage_95": {}}
+    for method, of in ranks.items():
+        counts = np.array([np.histogram(column, BINS, (-0.5, DRAWS + 0.5))[0] for column in np.array(of).T])
+        expected = DATA_SETS / BINS
+        p = chi2.sf(((counts - expected) ** 2 / expected).sum(1), BINS - 1)
+        record["ranks"][method] = {"counts": counts.tolist(), "uniform_p": dict(zip(PRIOR, p.tolist()))}
+    tables = {"noise recorded, prior": covered}
+    tables["noise recorded, 24 samples"] = counted(rng, 1, SIGMA)
+    tables["noise not recorded, 8 samples"] = counted(rng, FEW, None)
+    for name, of in tables.items():
+        record["coverage_95"][name] = {
+            method: float(np.mean(x)) if "band" in method else dict(zip(PRIOR, np.mean(x, 0).tolist()))
+            for method, x in of.items()
+        }
+    write_json(folder / "result.json", record)
+    write_figure(folder / "figures" / "ranks.png", drawn(record), dpi=110)
+    worst = min(p for m in record["ranks"].values() for p in m["uniform_p"].values())
+    every = [c for of in record["coverage_95"].values() for c in of.values()]
+    flat = [c for e in every for c in (e.values() if isinstance(e, dict) else [e])]
+    return f"{DATA_SETS} data sets: least p of uniform ranks {worst:.2f}; coverage {min(flat):.3f} to {max(flat):.3f}"
+
+
+def drawn(record) -> Figure:
+    """Histograms of ranks with the range in which 95 % of bins of a calibrated posterior lie; coverages below."""
+    methods = list(record["ranks"])
+    figure = Figure(figsize=(9, 7.6), layout="constrained")
+    axes = figure.subplots(len(methods) + 1, len(PRIOR), squeeze=False)
+    low, high = binom.ppf([0.025, 0.975], DATA_SETS, 1 / BINS)
+    for row, method in zip(axes, methods, strict=False):
+        for ax, path, counts in zip(row, PRIOR, record["ranks"][method]["counts"], strict=True):
+            ax.bar(np.arange(BINS), counts, color="#1f6fb2", label="data sets in the bin")
+            ax.axhspan(low, high, color="#d9730d", alpha=0.2, label="95 % of bins if uniform")
+            p = record["ranks"][method]["uniform_p"][path]
+            ax.set_title(f"{method}: {path}, p = {p:.2f}", loc="left", fontsize=9)
+            ax.set_xlabel("rank of the truth among the draws, tenths", fontsize=8)
+            ax.set_ylabel("data sets", fontsize=8)
+            ax.set_ylim(0, 1.25 * max(max(counts), high))
+    low, high = binom.ppf([0.025, 0.975], DATA_SETS, 0.95) / DATA_SETS
+    for ax, path in zip(axes[-1], PRIOR, strict=True):
+        rows = [(f"{m}\n{name}", of[path]) for name, by in record["coverage_95"].items() for m, of in by.items()
+                if isinstance(of, dict)]  # fmt: skip
+        y = np.arange(len(rows))[::-1]
+        ax.plot([c for _, c in rows], y, "o", color="#1f6fb2")
+        ax.axvspan(low, high, color="#d9730d", alpha=0.2)
+        ax.axvline(0.95, color="#22313f", linewidth=0.8)
+        ax.set_yticks(y, [text for text, _ in rows] if path == next(iter(PRIOR)) else [""] * len(rows), fontsize=7)
+        ax.set_xlim(0.85, 1)
+        ax.set_title(path, loc="left", fontsize=9)
+        ax.set_xlabel("share of 95 % intervals that hold the truth", fontsize=8)
+    figure.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False, fontsize=8
+    )
+    return figure
+
+
+if __name__ == "__main__":
+    print(main(Path(__file__).parent))

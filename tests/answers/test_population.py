@@ -1,0 +1,124 @@
+"""A population fit against what made the data, and against closed forms where there is one."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tissuejax.campaign.population import Estimates, Population, estimates, pooled, population
+from tissuejax.cli import main
+from tissuejax.errors import InputError
+
+pytest.importorskip("numpyro")
+
+
+def made(rng, n=40, groups=8, error=0.15, between=0.2, among=0.3):
+    """Log-normal specimens in groups, one parameter beside one that is plain; measured with errors."""
+    group = np.arange(n) % groups
+    a = among * rng.normal(size=groups)
+    theta = np.stack([np.log(2000.0) + a[group] + between * rng.normal(size=n), 5.0 + 2.0 * rng.normal(size=n)], 1)
+    x = theta + np.array([error, 1.5]) * rng.normal(size=(n, 2))
+    values = np.stack([np.exp(x[:, 0]), x[:, 1]], 1)
+    std = np.stack([error * values[:, 0], np.full(n, 1.5)], 1)
+    covariance = np.einsum("ni,ij->nij", std**2, np.eye(2))
+    names = tuple(f"s{i}" for i in range(n))
+    told = tuple(f"g{g}" for g in group)
+    return theta, Estimates(names, ("energy.mu", "energy.c"), values, covariance, np.array([True, False]), told)
+
+
+def test_working_coordinates_go_there_and_back(rng):
+    _, of = made(rng)
+    x, S = of.working
+    np.testing.assert_allclose(of.natural(x), of.values)
+    np.testing.assert_allclose(S[:, 0, 0], 0.15**2, rtol=1e-12)
+
+
+def test_the_pooled_fit_is_the_weighted_mean(rng):
+    _, of = made(rng)
+    value, std = pooled(of)
+    w = 1 / of.covariance[:, 1, 1]
+    assert value[1] == pytest.approx(np.sum(w * of.values[:, 1]) / w.sum())
+    assert std[1] == pytest.approx(w.sum() ** -0.5)
+
+
+def test_with_the_spreads_known_a_specimen_is_the_weighted_mean(rng):
+    _, of = made(rng, n=6, groups=2)
+    ones = np.ones((500, 1, 1))
+    B, m = np.diag([0.04, 4.0]), np.array([7.6, 5.0])
+    known = Population(of, np.tile(m, (500, 1)), ones * B, 0 * ones * B, np.zeros((500, 2, 2)), 0, 1.0)
+    x, S = of.working
+    mean, std = known.specimens()
+    weight = 1 / np.diag(B) + 1 / np.einsum("nii->ni", S)
+    np.testing.assert_allclose(mean, (m / np.diag(B) + x / np.einsum("nii->ni", S)) / weight)
+    np.testing.assert_allclose(std, weight**-0.5)
+    new = known.new("g1")
+    assert np.std(np.log(new[:, 0])) == pytest.approx(0.2, rel=0.15)
+    assert np.std(new[:, 1]) == pytest.approx(2.0, rel=0.15)
+    with pytest.raises(InputError, match="g0"):
+        known.new("g9")
+
+
+@pytest.mark.slow
+def test_mean_and_spreads_are_found_again_and_specimens_shrink(rng):
+    theta, of = made(rng)
+    found = population(of, draws=300, warmup=300, chains=2)
+    assert found.divergences < 10
+    assert found.rhat < 1.05
+    low, high = np.quantile(np.sqrt(found.between[:, 0, 0]), [0.005, 0.995])
+    assert low < 0.2 < high
+    low, high = np.quantile(np.sqrt(found.between[:, 1, 1]), [0.005, 0.995])
+    assert low < 2.0 < high
+    low, high = np.quantile(np.sqrt(found.between_groups[:, 0, 0]), [0.005, 0.995])
+    assert low < 0.3 < high
+    shrunken, std = found.specimens()
+    x, S = of.working
+    assert (np.mean((shrunken - theta) ** 2, 0) < np.mean((x - theta) ** 2, 0)).all()
+    assert (std < np.sqrt(np.einsum("nii->ni", S)) * 1.02).all()
+    new = np.log(found.new()[:, 0])
+    assert np.std(new) == pytest.approx(np.hypot(0.2, 0.3), rel=0.6)
+    known = np.log(found.new("g0")[:, 0])
+    assert np.std(known) < np.std(new)
+
+
+def test_fits_that_say_nothing_are_left_out():
+    def record(value, std, bound=None, status="converged"):
+        p = {"value": value, "std": std, "at_bound": bound, "free": True, "unit": "Pa"}
+        return {
+            "status": status,
+            "parameters": {"energy.mu": p},
+            "correlation": {"paths": ["energy.mu"], "matrix": [[1.0]]},
+        }
+
+    rows = {f"s{i}": record(1000.0 + i, 10.0) for i in range(4)}
+    rows |= {"bound": record(1.0, 1.0, "lower"), "lost": record(1.0, None), "no": record(1.0, 1.0, status="no")}
+    of = estimates(rows)
+    assert of.samples == ("s0", "s1", "s2", "s3")
+    assert of.positive.all()
+    assert of.units == ("Pa",)
+    np.testing.assert_allclose(of.covariance.ravel(), 100.0)
+    with pytest.raises(InputError, match="three or more"):
+        estimates({"s0": rows["s0"], "bound": rows["bound"]})
+
+
+@pytest.mark.slow
+def test_a_population_of_a_campaign(tmp_path, capsys, rng):
+    stretch = np.linspace(1.0, 1.3, 20)
+    rows = ["specimen,stretch,stress\n"]
+    for name, mu in (("pig1-a", 3), ("pig1-b", 3.4), ("pig2-a", 5), ("pig2-b", 5.6), ("pig2-c", 5.2)):
+        rows += [f"{name},{l},{mu * (l - l**-2) + 0.01 * rng.normal()}\n" for l in stretch]
+    (tmp_path / "lab.csv").write_text("".join(rows))
+    (tmp_path / "lab.toml").write_text(
+        'file = "lab.csv"\nsample = "{specimen}"\nrecording = "pull"\nexperiment = "uniaxial"\n[columns]\n'
+        'stretch = { column = "stretch" }\nnominal_stress = { column = "stress", unit = "kPa" }\n'
+    )
+    c = str(tmp_path / "c")
+    assert main(["campaign", "run", c, str(tmp_path / "lab.toml"), "--energy", "neo-hookean"]) == 0
+    assert main(["campaign", "population", c, "--group", "pig9"]) == 2
+    capsys.readouterr()
+    assert main(["campaign", "population", c, "--group", r"^(pig\d)", "--json"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["groups"] == ["pig1", "pig2"]
+    low, high = record["new_specimen"]["energy.mu"]["95 %"]
+    assert low < 3000
+    assert high > 5600
+    assert (tmp_path / "c" / "population" / "report.html").stat().st_size > 10_000
