@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import tissuejax as tj
-from tissuejax.diagnosis.search import Budget
+from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.diagnosis.transfer import transfer
 from tissuejax.energies.catalogue import energy
@@ -27,7 +27,7 @@ DAYS, MEATS = ("230327", "230331", "230403", "230407", "230411"), ("RDG", "FF")
 TIMES = (0.05, 0.5, 6.0)  # s, between those found test by test
 TAUS = {f"effects.viscoelasticity.tau{i + 1}": t for i, t in enumerate(TIMES)}
 SHARES = tuple(f"effects.viscoelasticity.g{i + 1}" for i in range(len(TIMES)))
-BUDGET = Budget(most=2, beam=(1, 2), nominees=(6, 3))
+EFFORT = Effort(most=2)
 SHOWN = 1  # of the first five
 
 
@@ -77,7 +77,7 @@ def main(folder: Path) -> str:
     discovery, later = chosen(list(samples), 0), chosen(list(samples), 1)
     records = {}
     for name in (*discovery, *later):
-        found = tj.diagnose(samples[name], ENERGY, budget=BUDGET, progress=for_terminal())
+        found = tj.diagnose(samples[name], ENERGY, effort=EFFORT, progress=for_terminal())
         records[name] = brief(found)
         if name == discovery[SHOWN]:
             write_diagnosis(found, folder / "figures" / "diagnosis", remainders=False)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import tissuejax as tj
-from tissuejax.diagnosis.search import Budget
+from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read_all
@@ -25,7 +25,7 @@ ENERGY, EVERY, SHOWN = "neo-hookean", 3, "EF10_0T"
 # One rate and no unloading: nothing that happens in time can be seen, so it is not asked for.
 TRIED = ("energy-form", "platen-friction", "slack", "machine-compliance", "permanent-set", "drift")
 LEVELS = np.linspace(1.0, 0.35, 200)
-BUDGET = Budget(most=2, beam=(1, 2), nominees=(6, 3))
+EFFORT = Effort(most=2)
 
 
 def repeats(recordings: list[Recording]) -> float:
@@ -56,7 +56,7 @@ def main(folder: Path) -> str:
     records = {}
     for name, whole in read_all(folder / "ecoflex.toml").items():
         sample, noise = picked(whole)
-        found = tj.diagnose(sample, ENERGY, effects=TRIED, budget=BUDGET, progress=for_terminal())
+        found = tj.diagnose(sample, ENERGY, effects=TRIED, effort=EFFORT, progress=for_terminal())
         records[name] = brief(found) | {"noise_Pa": noise, "recordings": list(sample.recordings)}
         if name == SHOWN:
             write_diagnosis(found, folder / "figures" / "diagnosis", remainders=False)

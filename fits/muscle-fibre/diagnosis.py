@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import tissuejax as tj
-from tissuejax.diagnosis.search import Budget
+from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.diagnosis.transfer import transfer
 from tissuejax.energies.catalogue import energy
@@ -22,7 +22,7 @@ from tissuejax.storage import write_json
 
 ENERGY, HELD = "reduced-polynomial-2", "ramp 10 s"
 STATES = ("Relaxed", "RelaxedMavaSet", "pCa4.4", "Mava_pCa4.4")
-BUDGET = Budget(most=2, beam=(1, 2), nominees=(6, 3))
+EFFORT = Effort(most=2)
 
 
 def unsaid(sample: Sample) -> Sample:
@@ -39,7 +39,7 @@ def main(folder: Path) -> str:
     records, found = {}, {}
     for state in STATES:
         sample = unsaid(tj.read(f"{folder / 'fibre.toml'}#{state}"))
-        found[state] = (sample, tj.diagnose(sample, ENERGY, holdout=HELD, budget=BUDGET, progress=for_terminal()))
+        found[state] = (sample, tj.diagnose(sample, ENERGY, holdout=HELD, effort=EFFORT, progress=for_terminal()))
         records[state] = brief(found[state][1])
         if state == STATES[0]:
             write_diagnosis(found[state][1], folder / "figures" / "diagnosis", remainders=False)

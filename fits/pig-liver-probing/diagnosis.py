@@ -6,6 +6,7 @@ The engine of `tissuejax diagnose` on a bench of its own: ten depths at each of 
 tissuejax study fits/pig-liver-probing
 """
 
+import copy
 import csv
 import os
 from pathlib import Path
@@ -15,9 +16,11 @@ import numpy as np
 from scipy.optimize import minimize
 
 from tissuejax.diagnosis.bench import Bench, Candidate, Free, Segment
-from tissuejax.diagnosis.decide import decide
-from tissuejax.diagnosis.search import Budget, search
+from tissuejax.diagnosis.judgement import answer as judged
+from tissuejax.diagnosis.judgement.blocks import blocks, series
+from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.errors import InputError
+from tissuejax.estimation.discrepancy import discrepancy
 from tissuejax.experiments.layer_indentation import force
 from tissuejax.report.page import png
 from tissuejax.report.plot import FAINT, HELD, INK, MODEL, grid
@@ -31,7 +34,7 @@ NOISE, SPREAD = (
 HELD_OUT = 5  # every fifth site
 CENTRES = 5  # a field is spanned by CENTRES x CENTRES bells over the region
 SHALLOW = 7  # steps from which the deeper three are predicted
-BUDGET = Budget(most=2, beam=(1, 2), nominees=(6, 4), starts=2, iterations=40)
+EFFORT = Effort(most=2)
 
 
 def read(folder: Path) -> dict[str, dict[str, np.ndarray]]:
@@ -199,17 +202,23 @@ def site_by_site(data: dict[str, np.ndarray]) -> dict:
 def answer(data: dict[str, np.ndarray]) -> tuple[dict, Sites, tuple[np.ndarray, np.ndarray]]:
     """The verdict of one region, its bench, and the predictions before and after."""
     bench = Sites.of(data)
-    s = search(bench, BUDGET)
-    v = decide(s)
+    whole = copy.copy(bench)
+    whole.fitted, whole.held_out = (*bench.fitted, *bench.held_out), ()
+    cut = blocks(whole)
+    of = discrepancy(series(whole, cut, dict.fromkeys(whole.fitted, "press")), cut.spread(whole.sigma))
+    v = judged.answer(bench, whole, cut, of, EFFORT)
     mask = {n: bench.mask((n,)) for n in ("fitted sites", "held-out sites")}
 
     def rmse(r):
         return {n: float(np.sqrt(np.mean((bench.y - r.prediction)[m] ** 2))) for n, m in mask.items()}
 
     alone = {
-        k: {"chi2": r.chi2 / r.n, "held_out": r.held / r.n_held, "rmse_N": rmse(r), "parameters": r.k}
-        for keys, r in s.refits.items()
-        for k in [" + ".join(sorted(keys)) or "one tissue"]
+        s.label or " + ".join(s.keys) or "one tissue": {
+            "log_evidence": s.log_evidence,
+            "chi2_with_all_sites": s.chi2 / s.n,
+            "parameters": s.k,
+        }
+        for s in v.evidence.sets
     }
     record = {
         "sites": len(bench.depth),
@@ -217,13 +226,14 @@ def answer(data: dict[str, np.ndarray]) -> tuple[dict, Sites, tuple[np.ndarray, 
         "effects": list(v.chosen.keys),
         "rivals": [list(r.keys) for r in v.rivals],
         "confidence": v.confidence,
+        "inclusion": dict(v.judgement.inclusion),
         "explained": {"fitted": v.explained[0], "held_out": v.explained[1]},
-        "before_rmse_N": rmse(s.empty),
+        "before_rmse_N": rmse(v.empty),
         "after_rmse_N": rmse(v.chosen),
         "sets": alone,
         "site_by_site": site_by_site(data),
     }
-    return record, bench, (s.empty.prediction, v.chosen.prediction)
+    return record, bench, (v.empty.prediction, v.chosen.prediction)
 
 
 def picture(answers: dict) -> bytes:

@@ -8,7 +8,7 @@ tissuejax study fits/porcine-skin
 from pathlib import Path
 
 import tissuejax as tj
-from tissuejax.diagnosis.search import Budget
+from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.report.diagnosis_page import write_diagnosis
 from tissuejax.report.page import write_figures
@@ -17,7 +17,7 @@ from tissuejax.storage import write_json
 ENERGIES = ("demiray",)
 SHOWN = ("demiray", "off_y")
 TRIED = ("anisotropy", "energy-form", "slack", "drift", "permanent-set")
-BUDGET = Budget(most=2, beam=(1, 2), nominees=(6, 3))
+EFFORT = Effort(most=2)
 
 
 def main(folder: Path) -> str:
@@ -25,7 +25,7 @@ def main(folder: Path) -> str:
     sample, records = tj.read(folder / "skin.toml"), {}
     for energy in ENERGIES:
         for path in sample.recordings:
-            found = tj.diagnose(sample, energy, holdout=path, effects=TRIED, budget=BUDGET)
+            found = tj.diagnose(sample, energy, holdout=path, effects=TRIED, effort=EFFORT)
             records[f"{energy}, without {path}"] = brief(found)
             if (energy, path) == SHOWN:
                 write_diagnosis(found, folder / "figures" / "diagnosis", remainders=False)

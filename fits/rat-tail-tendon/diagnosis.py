@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import tissuejax as tj
-from tissuejax.diagnosis.search import Budget
+from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.diagnosis.transfer import transfer
 from tissuejax.energies.catalogue import energy
@@ -27,7 +27,7 @@ from tissuejax.storage import write_json
 ENERGY, EVERY = "reduced-polynomial-2", 4
 SHOWN = "relax_fresh_1"
 DIAGNOSED = (SHOWN, "relax_incubated_1", "failure_incubated_1", "failure_incubated_2")
-BUDGET = Budget(most=2, beam=(1, 2), nominees=(6, 3))
+EFFORT = Effort(most=2)
 
 
 def thinned(sample: Sample) -> Sample:
@@ -50,7 +50,7 @@ def main(folder: Path) -> str:
     records, relaxation = {}, {}
     for name in DIAGNOSED:
         sample = samples[name]
-        found = tj.diagnose(sample, ENERGY, budget=BUDGET, progress=for_terminal())
+        found = tj.diagnose(sample, ENERGY, effort=EFFORT, progress=for_terminal())
         records[name] = brief(found)
         if name == SHOWN:
             write_diagnosis(found, folder / "figures" / "diagnosis", remainders=False)

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import tissuejax as tj
-from tissuejax.diagnosis.search import Budget
+from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.recordings.recording import Channel, Sample
 from tissuejax.report.diagnosis_page import write_diagnosis
@@ -28,7 +28,7 @@ UNSUITED = ("neo-hookean", None)
 SPREAD = 0.03
 HELD, STRICT = "planar", "Meunier_2008"
 TRIED = ("energy-form", "slack", "platen-friction", "drift")  # what can act in a curve without time or direction
-BUDGET = Budget(most=2, beam=(1, 2), nominees=(6, 3))
+EFFORT = Effort(most=2)
 
 
 def spread(sample: Sample) -> Sample:
@@ -57,7 +57,7 @@ def main(folder: Path) -> str:
             name = f"{source}, {energy}, {words.split(', ')[1]}"
             if name in records:
                 continue
-            found = tj.diagnose(sample, energy, holdout=HELD, ogden_form=form, effects=TRIED, budget=BUDGET)
+            found = tj.diagnose(sample, energy, holdout=HELD, ogden_form=form, effects=TRIED, effort=EFFORT)
             records[name] = brief(found) | {"energy": words.split(",")[0]}
             if source == STRICT:
                 place = folder / "figures" / f"diagnosis-{words.replace(', ', '-').replace(' ', '-')}"

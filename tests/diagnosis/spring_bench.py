@@ -1,8 +1,14 @@
 """A bench in closed form: a cubic spring with candidates that can be worked out by hand, to test the engine alone."""
 
+import copy
+
 import numpy as np
 
 from tissuejax.diagnosis.bench import Bench, Candidate, Free, Segment
+from tissuejax.diagnosis.judgement.answer import Answered, answer
+from tissuejax.diagnosis.judgement.blocks import blocks, series
+from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.estimation.discrepancy import discrepancy
 
 TIME = np.arange(0, 20.0, 0.05)
 
@@ -71,7 +77,7 @@ def spring(truth, *, seed=0, sigma=0.05, rho=0.0, names=("r1", "r2", "r3"), held
     rng = np.random.default_rng(seed)
     n = len(TIME)
     segments = [
-        Segment(name, "force", "", slice(i * n, (i + 1) * n), TIME, "N", drive(1000 * seed + i), "stretch", "1")
+        Segment(name, "force", "", slice(i * n, (i + 1) * n), TIME, "N", drive(1000 * seed + i), "shear", "1")
         for i, name in enumerate(names)
     ]
     fitted = tuple(x for x in names if x not in held_out)
@@ -94,3 +100,12 @@ def spring(truth, *, seed=0, sigma=0.05, rho=0.0, names=("r1", "r2", "r3"), held
         y[s.rows] += sigma * e
     sample.y = y
     return sample
+
+
+def judged(bench: Bench, effort: Effort | None = None) -> Answered:
+    """The answer of the judgement, all recordings weighed."""
+    whole = copy.copy(bench)
+    whole.fitted, whole.held_out = (*bench.fitted, *bench.held_out), ()
+    cut = blocks(whole)
+    of = discrepancy(series(whole, cut, dict.fromkeys(whole.fitted, "spring")), cut.spread(whole.sigma))
+    return answer(bench, whole, cut, of, effort)

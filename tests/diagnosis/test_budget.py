@@ -3,7 +3,7 @@
 import numpy as np
 
 from tissuejax.diagnosis.diagnose import diagnose
-from tissuejax.diagnosis.search import Budget
+from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 
@@ -21,6 +21,6 @@ def sample(offset: float = 30.0) -> Sample:
 
 
 def test_a_search_ends_when_its_budget_is_spent_and_says_so():
-    found = diagnose(sample(), energy="neo-hookean", effects=("drift", "aging"), budget=Budget(most=2, spend=(1.0,)))
+    found = diagnose(sample(), energy="neo-hookean", effects=("drift", "aging"), effort=Effort(most=2, spend=1.0))
     assert any("was spent" in w for w in found.as_dict()["warnings"])
     assert found.as_dict()["effects"] == []

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from tissuejax.diagnosis.diagnose import diagnose
-from tissuejax.diagnosis.search import Budget
+from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.recordings import files
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 EFFECTS = ("slack", "aging", "drift")  # light ones: a verdict in a second
-QUICK = Budget(most=1)
+QUICK = Effort(most=1)
 TIME = np.arange(0, 16.0, 0.08)
 PATHS = {
     "pull": [1, 1, 1.3, 1.3, 1, 1],
@@ -43,7 +43,7 @@ def sample():
 
 
 def verdict(source):
-    found = diagnose(source, holdout="both", effects=EFFECTS, budget=QUICK)
+    found = diagnose(source, holdout="both", effects=EFFECTS, effort=QUICK)
     return found.verdict
 
 

@@ -4,25 +4,26 @@ import re
 
 import numpy as np
 import pytest
-from spring_bench import spring
+from spring_bench import judged, spring
 
 from tissuejax.diagnosis.bench import Segment
-from tissuejax.diagnosis.decide import decide
+from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.result import Diagnosis
-from tissuejax.diagnosis.search import Budget, search
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.diagnosis.stiffness_map import StiffnessMap
 from tissuejax.report import diagnosis_sentences as sentences
+from tissuejax.report import judged_sentences
 from tissuejax.report.diagnosis_map import DiagnosisMap, strongest
 from tissuejax.report.diagnosis_markers import DiagnosisMarkers
 from tissuejax.report.diagnosis_page import write_diagnosis
 from tissuejax.report.diagnosis_remainder import DiagnosisRemainder
 from tissuejax.report.diagnosis_specimens import DiagnosisSpecimens
 
+QUICK = Effort(most=1, singles=4, reshaped=(0, 0, 0))
+
 
 def diagnosed(bench, **more):
-    found = search(bench)
-    return Diagnosis("spring", "cubic", found, decide(found), 1.0, **more)
+    return Diagnosis("spring", "cubic", judged(bench, QUICK), 1.0, **more)
 
 
 @pytest.fixture(scope="module")
@@ -60,9 +61,9 @@ def test_the_page_tells_the_story_in_its_order(relaxing, tmp_path):
 
 
 def test_sentences_say_how_sure_and_against_what(relaxing):
-    lines = " ".join(sentences.sure(relaxing))
-    assert "what is left is noise" in lines
-    assert "best other explanation" in lines
+    lines = " ".join(judged_sentences.sure(relaxing))
+    assert "The most probable is given" in lines
+    assert "Probability that an effect is present" in lines
     assert "second specimen" in sentences.next_steps(relaxing)[0]
 
 
@@ -94,14 +95,13 @@ def test_markers_and_maps_are_shown_where_there_are_some(relaxing, rng):
             rows.append(rest + 1e-5 * rng.standard_normal(n))
             missed.append(5e-4 * (j == 4 and a == "x") * depth / 5e-3)
     bench.y, bench.sigma = np.concatenate(rows), np.full(n * len(rows), 1e-5)
-    bench.fitted, bench.held_out = ("r1",), ()
+    bench.fitted, bench.held_out, bench.candidates = ("r1",), (), {}
     bench.predict = lambda values, recordings=None: bench.y - np.concatenate(missed)
     bench.jacobian = lambda values, paths, recordings=None: np.zeros((len(bench.y), len(paths)))
     centres = np.array([[x, y, z] for x, y, _ in places for z in (0.001, 0.003)])
     gain = np.where(np.arange(12) == 9, 5.0, 0.1)
-    found = search(bench, Budget(most=0))
     maps = [StiffnessMap("r1", centres, np.zeros((0, 8), int), centres, gain, gain)]
-    d = Diagnosis("probe", "cubic", found, decide(found), 1.0, maps=maps)
+    d = diagnosed(bench, maps=maps)
     seen = DiagnosisMarkers().prepare(d)
     assert int(np.argmax(seen[0].chi_before)) == 4
     assert "marker 4 in r1" in DiagnosisMarkers().caption(seen)

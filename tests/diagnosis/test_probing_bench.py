@@ -10,9 +10,8 @@ from tissuejax.cache import source
 from tissuejax.diagnosis import probing_free
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.probing import ProbingBench
-from tissuejax.diagnosis.probing_numerics import numerics
-from tissuejax.diagnosis.probing_refits import spread
 from tissuejax.diagnosis.probing_runs import COARSE, FINE
+from tissuejax.diagnosis.probing_view import REMAINS, ProbingView, probing_blocks, probing_discrepancy
 from tissuejax.diagnosis.refit import refit
 from tissuejax.energies.catalogue import energy
 from tissuejax.recordings.recording import Sample
@@ -53,16 +52,6 @@ def test_what_acts_in_one_recording_is_run_in_that_one(bench):
     count = bench.runs.count
     bench.predict(VALUES | {"effects.contact-offset.depth.b": 1e-4})
     assert bench.runs.count == count + 1
-
-
-def test_friction_that_may_give_starts_stronger_than_the_rigid_stick_that_was_found(bench):
-    """With presses alone, 0.18 without give and 0.46 with it are two minima (of a case with 0.42)."""
-    coefficient, give = "effects.friction.coefficient", "effects.friction.give"
-    begun = spread(bench, VALUES | {coefficient: 0.18}, "friction/giving")
-    assert begun[coefficient] > 0.4
-    assert begun[give] > 0
-    found = VALUES | {coefficient: 0.3, give: 1e-8}
-    assert spread(bench, found, "inclusion/flat") == found
 
 
 @pytest.mark.parametrize(
@@ -126,17 +115,46 @@ def test_a_probe_that_is_too_low_is_found_again(bench):
     assert found.chi2 < 1.1 * found.n
 
 
-def test_mesh_step_and_penalty_are_told_apart(bench):
-    """Each leaves something open, and together they take up no more of the misfit than there is."""
-    misfit = white(bench)
-    base = refit(bench, misfit, (), {}, iterations=6, tolerance=5.0)
-    found = numerics(bench, misfit, base)
-    assert set(found.rms) == {"mesh", "step", "penalty"} == set(found.amplitudes)
-    assert all(0 < found.rms[choice]["force"] < 30 for choice in ("step", "penalty"))
-    assert 0 <= found.gain <= base.chi2
-    assert found.held <= base.held
-    assert all(abs(a) <= 1.5 + 1e-9 for a in found.amplitudes.values())
-    assert found.amplitudes["step"] >= 0, "no recording was made slower than life"
+def test_a_view_is_exact_where_it_is_anchored_and_weighs_every_channel_alike(bench):
+    view = ProbingView.of(bench)
+    near = view.anchored(VALUES)
+    exact = near.natural(near.predict(VALUES))
+    np.testing.assert_allclose(exact, bench.predict(VALUES), rtol=1e-9, atol=1e-12)
+    # beside the anchor it changes as the coarse simulation does
+    other = VALUES | {"energy.C10": 1.1 * VALUES["energy.C10"]}
+    coarse = [bench.runs.many([(bench.at(v), bench.fitted, COARSE)])[0] for v in (VALUES, other)]
+    change = near.natural(near.predict(other)) - exact
+    np.testing.assert_allclose(change, coarse[1] - coarse[0], rtol=1e-6, atol=1e-9)
+    for channel in ("force", "markers"):
+        rows = np.concatenate([view.y[s.rows] for s in view.segments if s.channel == channel])
+        assert 0.9 < np.abs(rows).max() < 2.0
+
+
+def test_what_is_open_is_a_column_for_every_channel_of_every_recording(bench):
+    near = ProbingView.of(bench).anchored(VALUES)
+    columns = near.numerical
+    pairs = {(s.recording, s.channel) for s in bench.segments}
+    assert columns.shape == (len(bench.y), len(pairs))
+    assert (np.count_nonzero(columns, axis=1) <= 1).all()
+    fine, coarse = (bench.runs.many([(bench.at(VALUES), bench.fitted, k)])[0] for k in (FINE, COARSE))
+    np.testing.assert_allclose(columns.sum(axis=1) * near.unit, REMAINS * (fine - coarse), rtol=1e-6, atol=1e-12)
+
+
+def test_the_discrepancy_of_probings_is_a_covariance_of_every_family(bench):
+    view = ProbingView.of(bench)
+    cut = probing_blocks(view)
+    parts = probing_discrepancy(view, cut).about(cut.mean(view.y))
+    assert {p.family for p in parts} == {"law", "gain", "hysteresis", "slow", "marker", "white"}
+    for part in parts:
+        if part.factor is not None:
+            assert part.factor.shape[0] == len(cut.starts)
+            assert np.isfinite(part.factor).all()
+        else:
+            assert sum(len(b) for b in part.within) == len(cut.starts)
+            assert all(np.linalg.eigvalsh(b).min() > -1e-9 for b in part.within)
+    markers = next(p for p in parts if p.name == "marker")
+    for s, block in zip(view.segments, markers.within, strict=True):
+        assert (s.channel == "markers") == bool(np.any(block))
 
 
 def test_a_stopped_diagnosis_finds_its_runs_again(pressed_too_deep, tmp_path, monkeypatch):

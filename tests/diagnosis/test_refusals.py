@@ -4,16 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from spring_bench import spring
+from spring_bench import judged, spring
 
 from tissuejax.diagnosis.diagnose import diagnose
+from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.material import MaterialBench
-from tissuejax.diagnosis.search import Budget, search, surprise
 from tissuejax.energies.catalogue import energy
 from tissuejax.errors import InputError, NotConverged
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
-QUICK = {"effects": ("drift",), "budget": Budget(most=1)}
+QUICK = {"effects": ("drift",), "effort": Effort(most=1)}
 
 
 def sample(names=("r1", "r2"), n=60, values=None):
@@ -73,7 +73,7 @@ def test_a_base_model_that_cannot_be_fitted_at_all():
     bench = spring({})
     bench.predict = lambda values, recordings=None: np.full(len(bench.y), np.nan)
     with pytest.raises(NotConverged, match="name another --energy"):
-        search(bench)
+        judged(bench)
 
 
 def test_parameters_at_which_the_faces_cannot_be_found_are_impossible():
@@ -92,11 +92,3 @@ def test_parameters_at_which_the_faces_cannot_be_found_are_impossible():
     bench._built = {key: replace(program, run=fails) for key, program in bench._built.items()}
     with pytest.raises(ValueError, match="another thing"):
         bench.predict({})
-
-
-def test_surprise_is_chi_square_at_noise_and_grows_slowly_beyond():
-    assert surprise(90.0, 100) == 90.0
-    assert surprise(100.0, 100) == 100.0
-    # at its best v = chi2/n: n (log v + 1), by hand for a misfit e times the noise's variance
-    assert surprise(100 * np.e, 100) == pytest.approx(200.0)
-    assert surprise(0.0, 0) == 0.0

@@ -1,13 +1,17 @@
 """Two unlike families of fibres, where one family alone comes to rest along an axis of the tests."""
 
+import copy
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from tissuejax.diagnosis.decide import decide
-from tissuejax.diagnosis.material import MaterialBench
-from tissuejax.diagnosis.search import search
+from tissuejax.diagnosis.judgement.answer import answer
+from tissuejax.diagnosis.judgement.blocks import blocks, series
+from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.material import MaterialBench, modes
 from tissuejax.energies.catalogue import energy
+from tissuejax.estimation.discrepancy import discrepancy
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 MU, STIFF, NOISE = 1800.0, 1500.0, 10.0
@@ -65,9 +69,12 @@ def bench() -> MaterialBench:
 
 def test_two_unlike_families_are_found_from_off_the_axis(bench):
     """The tests, all along axes, can't tell an angle from its mirror image: 110 and 170 degrees from 70 and 10."""
-    verdict = decide(search(bench))
-    assert verdict.kind == "found"
-    assert verdict.quality.noise
+    whole = copy.copy(bench)
+    whole.fitted, whole.held_out = (*bench.fitted, *bench.held_out), ()
+    cut = blocks(whole)
+    of = discrepancy(series(whole, cut, modes(whole)), cut.spread(whole.sigma))
+    verdict = answer(bench, whole, cut, of, Effort(most=1))
+    assert verdict.judgement.names == ("anisotropy",)
     values = verdict.chosen.values
     angle, spread = (values[f"effects.anisotropy.{name}"] for name in ("angle", "spread"))
     found = np.sort(np.degrees(np.arccos(np.abs(np.cos([angle + spread, angle - spread])))))

@@ -11,6 +11,7 @@ from tissuejax.diagnosis.judgement.blocks import blocks, series
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.explore import Effort, Exploration, scaled
 from tissuejax.diagnosis.judgement.weigh import weigh
+from tissuejax.estimation.discrepancy import discrepancy
 
 FIBRES = Candidate("fibres", ("fibre.k",), ("fibre.onset",), ({"fibre.onset": 5.0},))
 MORE = {"fibre.k": Free(0, np.inf, 10), "fibre.onset": Free(0.01, 100, 1, log=True), "base.k": Free(0, np.inf, 1)}
@@ -48,7 +49,8 @@ def bench():
 def scales(bench):
     cut, start = blocks(bench), {p: bench.start[p] for p in bench.base}
     modes = dict.fromkeys(bench.fitted, "shear")
-    out = scaled(bench, cut, series(bench, cut, modes), bench.y, start)
+    of = discrepancy(series(bench, cut, modes), cut.spread(bench.sigma))
+    out = scaled(bench, cut, of, bench.y, start)
     base = weigh(out, (), start, Criteria())
     out.values, out.reference = base.refit.values, cut.mean(base.refit.prediction)
     return out, base

@@ -15,6 +15,7 @@ from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read
 from tissuejax.recordings.recording import Sample
 from tissuejax.report import diagnosis_sentences as sentences
+from tissuejax.report import judged_sentences as judged
 from tissuejax.report.diagnosis_page import write_diagnosis
 from tissuejax.report.headline import headline
 
@@ -28,21 +29,21 @@ class DiagnoseCommand(Command):
     teaches: ClassVar[str] = """
 Ask what a model lacks to predict the recordings of a sample.
 
-The base model is fitted; every effect of the catalogue, of tissue, rig and sensor, is tried, alone and together. Of
-material tests, sets of effects are compared by their evidence beside what any law leaves of real recordings; of
-probings by a criterion with the noise. The verdict is one of: nothing-missing; found; found-in-part (names, and a rest
-that is stated); ambiguous (one of these, and the experiment that would tell); or unexplained (something is missing that
-no effect of the catalogue accounts for). All recordings of material tests, those held out too, choose the set of
-effects; the parameters and the errors shown come from a fit to the others, with nothing fitted to those held out.
+The base model is fitted; every effect of the catalogue, of tissue, rig and sensor, is tried, alone and together. Sets
+of effects are compared by their evidence beside what any law leaves of real recordings, and what a simulation's mesh
+and step leave open. The verdict is one of: nothing-missing; found; found-in-part (names, and a rest that is stated);
+ambiguous (one of these, and the experiment that would tell); or unexplained (something is missing that no effect of the
+catalogue accounts for). All recordings, those held out too, choose the set of effects; the parameters and the errors
+shown come from a fit to the others, with nothing fitted to those held out.
 
   tissuejax diagnose liver.h5 --energy reduced-polynomial-2 --out out/liver
   tissuejax diagnose muscle.toml --energy neo-hookean --holdout slow --holdout fast
   tissuejax diagnose rubber.toml --energy ogden-3 --ogden-form mu/alpha --effect viscoelasticity --effect softening
 
 What is written into --out: result.json (every number), report.html (one page to read and keep), remainder.json (what is
-still left, as smooth functions of drive, rate, time and place), evidence.json of material tests (every set weighed) and
-the figures as PNG. Probings take minutes; one that was stopped goes on where it was when the same command is given
-again. Material tests and cuts begin anew.
+still left, as smooth functions of drive, rate, time and place), evidence.json (every set weighed) and the figures as
+PNG. Probings take minutes; one that was stopped goes on where it was when the same command is given again. Material
+tests and cuts begin anew.
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
@@ -88,9 +89,9 @@ def _only(sample: Sample, only: list[str], holdout: list[str] | None) -> Sample:
 
 def told(found: Diagnosis, written: dict[str, Path]) -> Reply:
     """The verdict as text and as the record of `--json`."""
-    lines = [headline(found), "", f"Verdict: {found.verdict.kind}. {sentences.lead(found)}", ""]
+    lines = [headline(found), "", f"Verdict: {found.verdict.kind}. {judged.lead(found)}", ""]
     lines += [f"  {r['path']:<40}{r['value']:>24} {r['unit']:<6}{r['note']}" for r in sentences.parameters(found)]
-    lines += ["", *sentences.sure(found), ""]
+    lines += ["", *judged.sure(found), ""]
     lines += [f"page     {written['page']}", f"numbers  {written['result']}"]
     record = found.as_dict() | {
         "headline": headline(found),

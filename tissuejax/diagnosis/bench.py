@@ -8,7 +8,6 @@ parameter paths that are neutral until freed. Material tests and probings are tw
 import abc
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -115,10 +114,7 @@ class Bench(abc.ABC):
         start: neutral values of all paths.
         candidates: by key.
         warnings: sentences for the reader.
-        dear: True where a prediction is a simulation: noise is taken as recorded, and refits stop early.
-        spent: cost of all predictions so far, in those of the plain base model (see `Budget.spend`).
-        numerics: of simulations: what mesh, step and penalty leave open at the fit of a set of candidates
-            (`probing_numerics.Numerics`), where that was asked.
+        spent: cost of all predictions so far, in those of the plain base model (see `Effort.spend`).
     """
 
     segments: Sequence[Segment]
@@ -131,9 +127,7 @@ class Bench(abc.ABC):
     start: dict[str, float]
     candidates: dict[str, Candidate]
     warnings: list[str] = field(default_factory=list)
-    dear: bool = False
     spent: float = 0.0
-    numerics: dict[frozenset, Any] = field(default_factory=dict)
 
     @abc.abstractmethod
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:
@@ -155,9 +149,23 @@ class Bench(abc.ABC):
         """Shapes at which to score a candidate; a bench may read some from the residual (a period, a place)."""
         return candidate.grid
 
-    def elsewhere(self, values: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
-        """Other values to start from that recordings may allow as well as `values` (another direction)."""
-        return ()
+    def anchored(self, values: Mapping[str, float]) -> "Bench":
+        """The bench with predictions exact at `values`: itself, unless it corrects a cheaper simulation there."""
+        return self
+
+    @property
+    def numerical(self) -> Float[np.ndarray, "N q"] | None:
+        """What mesh and step of a simulation leave open, a column for each independent part; None in closed form."""
+        return None
+
+    @property
+    def shown(self) -> "Bench":
+        """The bench in SI units: itself, unless it is a view of one."""
+        return self
+
+    def natural(self, prediction: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+        """A prediction in SI units."""
+        return prediction
 
     def burden(self, keys: Sequence[str]) -> int:
         """How many searches and memories a prediction with these candidates nests; sets of many are not tried."""

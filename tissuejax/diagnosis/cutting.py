@@ -139,7 +139,7 @@ def strokes_to_settle(sample: Sample, bench: CuttingBench, verdict) -> list[str]
     model, pair = bench._p.model.across(()), (verdict.chosen, verdict.rivals[0])
     fits = [(model, {q: float(r.all.get(q, bench.start[q])) for q in bench._order}) for r in pair]
     strokes = next_cut(sample, bench.fitted[0], *fits)
-    names = [" and ".join(r.keys) or "nothing" for r in pair]
+    names = [" and ".join(r.keys) or "nothing" for r in (verdict.chosen, verdict.rivals[0])]
     return [
         f"{names[0]} or {names[1]}? {s.what} would tell: they differ there by {s.apart:.0f} times the noise"
         for s in strokes[:2]

@@ -11,34 +11,47 @@ from threadpoolctl import threadpool_limits
 
 from tissuejax.cache.programs import keep_programs
 from tissuejax.diagnosis.cutting import CuttingBench, strokes_to_settle
-from tissuejax.diagnosis.decide import decide
 from tissuejax.diagnosis.foreseen import OPEN, foreseen
 from tissuejax.diagnosis.judgement.answer import Answered, answer, evidence_file
+from tissuejax.diagnosis.judgement.blocks import blocks, series
 from tissuejax.diagnosis.judgement.evidence import write_evidence
 from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.judgement.judge import Kind
-from tissuejax.diagnosis.judgement.material_diagnosis import MaterialDiagnosis
 from tissuejax.diagnosis.material import MaterialBench, modes
 from tissuejax.diagnosis.next_experiment import proposals, settling
 from tissuejax.diagnosis.next_probing import probing_proposals
 from tissuejax.diagnosis.offered import HYSTERESIS, SCATTER, offered
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_map import stiffness_maps
-from tissuejax.diagnosis.probing_search import BUDGET as PROBING
-from tissuejax.diagnosis.probing_search import search_probing
+from tissuejax.diagnosis.probing_view import ProbingView, probing_blocks, probing_discrepancy
 from tissuejax.diagnosis.result import Diagnosis
-from tissuejax.diagnosis.search import Budget, Search, search
 from tissuejax.diagnosis.sigma import sigmas
 from tissuejax.effects.catalogue import effects as all_effects
 from tissuejax.energies.catalogue import energy as named_energy
 from tissuejax.energies.energy import Energy
 from tissuejax.errors import InputError, unknown
+from tissuejax.estimation.discrepancy import discrepancy
 from tissuejax.experiments.catalogue import experiment
 from tissuejax.progress import Progress, Silent
 from tissuejax.recordings.files import read
 from tissuejax.recordings.plausible import refuse_gaps, refuse_unusable, slips
 from tissuejax.recordings.recording import Sample
 from tissuejax.storage import write_json
+
+# a set of effects costs seconds where predictions are simulations
+PROBING = Effort(
+    most=2,
+    singles=5,
+    pairs=4,
+    triples=0,
+    parents=(2, 0),
+    reshaped=(2, 1),
+    starts=1,
+    spend=900.0,
+    rounds=2,
+    iterations=6,
+    stepwise=True,
+)
 
 
 def diagnose(
@@ -49,7 +62,7 @@ def diagnose(
     progress: Progress | None = None,
     effects: Sequence[str] | None = None,
     ogden_form: str | None = None,
-    budget: Budget | None = None,
+    effort: Effort | None = None,
     keep: Path | None = None,
 ) -> Diagnosis:
     """What is missing in the model of a sample: the verdict, with everything it rests on.
@@ -63,7 +76,7 @@ def diagnose(
         out: folder for `result.json` and the unexplained remainder; nothing is written by default.
         effects: names of the effects to try; all that can act by default.
         ogden_form: for `ogden-N`.
-        budget: how much the search may spend.
+        effort: how much is tried and may be spent.
         keep: folder in which a stopped diagnosis of probings finds its finished simulations again (removed at the end);
             inside `out` by default. Other diagnoses begin anew.
 
@@ -86,14 +99,18 @@ def diagnose(
     base = named_energy(energy, ogden_form)
     kind = experiment(sample.recordings[fitted[0]].experiment).kind
     keep = keep or (None if out is None else Path(out) / "runs")
+    every = (*fitted, *held_out)
     if kind == "probing":
-        bench, budget = ProbingBench.of(sample, base, fitted, held_out, effects, keep), budget or PROBING
+        own = ProbingBench.of(sample, base, every, (), effects, keep)
+        whole, bench = ProbingView.of(own), ProbingView.of(own.narrowed(fitted, held_out, effects))
+        effort = effort or PROBING
     elif kind == "cutting":
-        bench = CuttingBench.of(sample, base, fitted, held_out, effects)
+        bench, whole = (CuttingBench.of(sample, base, f, h, effects) for f, h in ((fitted, held_out), (every, ())))
     else:
-        sigma, more = sigmas(sample, (*fitted, *held_out))
-        bench = MaterialBench.of(sample, base, fitted, held_out, sigma, effects)
-        whole = MaterialBench.of(sample, base, (*fitted, *held_out), (), sigma, effects)
+        sigma, more = sigmas(sample, every)
+        bench, whole = (
+            MaterialBench.of(sample, base, f, h, sigma, effects) for f, h in ((fitted, held_out), (every, ()))
+        )
         for b in (bench, whole):
             b.candidates, left_out = offered(sample, b.candidates, effects)
         remarks += more + left_out
@@ -113,52 +130,50 @@ def diagnose(
             stage.advance(note=note)
 
         if kind == "probing":
-            found = search_probing(bench, budget, told)
-        elif kind == "cutting":
-            found = search(bench, budget or Budget(), told)
+            cut = probing_blocks(whole)
+            of = probing_discrepancy(whole, cut)
         else:
-            effort = Effort(most=budget.most, spend=budget.spend[-1]) if budget else Effort()
-            found = answer(bench, whole, modes(whole), effort, told)
-    if kind == "homogeneous":
-        made = _material(sample, energy, base, bench, found)
-    else:
-        made = (_probing if kind == "probing" else _cutting)(sample, energy, bench, found)
+            cut = blocks(whole)
+            alike = modes(whole) if kind == "homogeneous" else dict.fromkeys(every, kind)
+            of = discrepancy(series(whole, cut, alike), cut.spread(whole.sigma))
+        found = answer(bench, whole, cut, of, effort, told)
+        made = {"homogeneous": _material, "probing": _probing, "cutting": _cutting}[kind](sample, energy, base, found)
+    if found.evidence.exhausted:
+        found.bench.warnings.append(
+            "what may be spent on predictions was spent: larger sets of effects were not all weighed"
+        )
     made.seconds = time.perf_counter() - begun
     if out is not None:
         write_json(Path(out) / "result.json", made.as_dict())
         write_json(Path(out) / "remainder.json", made.remainders())
-        if kind == "homogeneous":
-            write_evidence(found.evidence, evidence_file(Path(out)))
+        write_evidence(found.evidence, evidence_file(Path(out)))
     return made
 
 
-def _probing(sample: Sample, energy: str, bench: ProbingBench, found: Search) -> Diagnosis:
-    verdict = decide(found)
+def _probing(sample: Sample, energy: str, base: Energy, found: Answered) -> Diagnosis:
+    bench = found.bench
     # each planned press is a simulation
-    ideas = settling([probing_proposals(sample, bench, verdict.chosen, r, None) for r in verdict.rivals[:1]])
+    ideas = settling([probing_proposals(sample, bench, found.chosen, r, None) for r in found.rivals[:1]])
     maps = []
-    if verdict.kind != "nothing-missing":
+    if found.kind != Kind.NOTHING:
         maps = stiffness_maps(bench, found.empty.values, found.empty.prediction)
     bench.runs.forget()
-    return Diagnosis(sample.name, energy, found, verdict, 0.0, ideas, maps)
+    return Diagnosis(sample.name, energy, found, 0.0, ideas, maps)
 
 
-def _cutting(sample: Sample, energy: str, bench: CuttingBench, found: Search) -> Diagnosis:
-    verdict = decide(found)
-    bench.warnings += strokes_to_settle(sample, bench, verdict)
-    return Diagnosis(sample.name, energy, found, verdict, 0.0)
+def _cutting(sample: Sample, energy: str, base: Energy, found: Answered) -> Diagnosis:
+    found.bench.warnings += strokes_to_settle(sample, found.bench, found)
+    return Diagnosis(sample.name, energy, found, 0.0)
 
 
-def _material(sample: Sample, energy: str, base: Energy, bench: MaterialBench, found: Answered) -> MaterialDiagnosis:
+def _material(sample: Sample, energy: str, base: Energy, found: Answered) -> Diagnosis:
     ideas = settling([proposals(sample, base, found.bench, found.chosen, r, None) for r in found.rivals[:3]])
     open_ends = []
     if found.kind != Kind.UNEXPLAINED:
         keys = frozenset(found.chosen.keys)
         open_ends = foreseen(found.bench, found.whitenings[keys], found.plain[keys])
-        bench.warnings += [x.sentence(found.chosen) for x in open_ends if x.over_noise > OPEN]
-    if found.evidence.exhausted:
-        bench.warnings.append("what may be spent on predictions was spent: larger sets of effects were not all weighed")
-    return MaterialDiagnosis(sample.name, energy, found, found, 0.0, ideas, [], open_ends)
+        found.bench.warnings += [x.sentence(found.chosen) for x in open_ends if x.over_noise > OPEN]
+    return Diagnosis(sample.name, energy, found, 0.0, ideas, [], open_ends)
 
 
 def split(sample: Sample, holdout: str | Sequence[str] | None) -> tuple[tuple[str, ...], tuple[str, ...], list[str]]:

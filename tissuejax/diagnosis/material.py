@@ -23,7 +23,6 @@ from tissuejax.cache.programs import Kept
 from tissuejax.diagnosis.bench import Bench, Candidate, Free, Segment
 from tissuejax.diagnosis.catalogue import Entry, Sizes, entries
 from tissuejax.diagnosis.periodogram import lines
-from tissuejax.diagnosis.plausible import CYCLES
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.energies.energy import Energy
 from tissuejax.experiments.catalogue import experiment
@@ -32,6 +31,7 @@ from tissuejax.model import Model
 from tissuejax.recordings.recording import Sample
 
 MEMORIES = ("viscoelasticity", "softening")
+CYCLES = 2.5  # periods that the longest recording must hold to show one
 STEP = 1e-6  # of a parameter's scale
 SIZE = 10.0  # by which the base's defaults may be off before they are brought to size
 STRESS = 0.05  # of the largest stress: the least scale of a modulus or an offset

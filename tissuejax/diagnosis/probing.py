@@ -11,6 +11,7 @@ aside, too low or too late come from three runs with the probe displaced, by mul
 no memory.
 """
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -35,7 +36,6 @@ from tissuejax.recordings.recording import Sample
 STEP, LOG_STEP = 0.15, 0.04  # of a parameter's scale; of its logarithm
 AGED = 0.5  # standard deviation of the logarithm of stiffness at the end of a session
 COLUMN = 0.5  # step of a score's column, of the amplitude's scale
-STRONGER, GIVE = 2.5, 2e-8  # friction to start from anew, of the one found; m/Pa: 500 Pa move by 10 micrometres
 
 
 class ProbingBench(Bench):
@@ -73,14 +73,23 @@ class ProbingBench(Bench):
             free={},
             start={},
             candidates={},
-            dear=True,
         )
         bench.ready, bench.model = ready, model
         bench.finite = kept_samples(sample, segments)
         bench.runs = Runs({FINE: ready, COARSE: ready.with_settings(rough)}, {}, segments, y, bench.finite, keep)
-        bench.kind, bench.slopes, bench.shift = FINE, COARSE, None
+        bench.slopes = COARSE
         bench._declare(names)
         return bench
+
+    def narrowed(
+        self, fitted: tuple[str, ...], held_out: tuple[str, ...], names: Sequence[str] | None = None
+    ) -> "ProbingBench":
+        """The same probings and runs with other recordings fitted; `names`: effects to try."""
+        made = copy.copy(self)
+        made.fitted, made.held_out, made.warnings = fitted, held_out, list(self.warnings)
+        made.free, made.start, made.candidates = {}, {}, {}
+        made._declare(names)
+        return made
 
     def _declare(self, names: Sequence[str] | None) -> None:
         recordings = (*self.fitted, *self.held_out)
@@ -131,8 +140,7 @@ class ProbingBench(Bench):
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:
         """See `Bench.predict`; NaN where a simulation broke down."""
         wanted = tuple(recordings or (*self.fitted, *self.held_out))
-        told = self.runs.many([(self.at(values), wanted, self.kind)])[0]
-        return told if self.shift is None else told + self.shift
+        return self.runs.many([(self.at(values), wanted, FINE)])[0]
 
     def jacobian(
         self, values: Mapping[str, float], paths: Sequence[str], recordings: Sequence[str] | None = None
@@ -156,14 +164,6 @@ class ProbingBench(Bench):
             asked.append(({**self.at(values), **setting, path: neutral}, path, COLUMN * self.free[path].scale, wanted))
         return self._columns(asked)
 
-    def elsewhere(self, values: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
-        """Where the surface sticks, a rigid stick of weak friction passes for a giving one of strong friction, and no
-        step leads from one to the other; see `Bench.elsewhere`."""
-        if "effects.friction.give" not in values:
-            return ()
-        stronger = min(STRONGER * values["effects.friction.coefficient"], 1.0)
-        return ({"effects.friction.coefficient": stronger, "effects.friction.give": GIVE},)
-
     def _columns(self, asked: Sequence[tuple[dict, str, float, tuple[str, ...]]]) -> Float[np.ndarray, "N k"]:
         """Derivatives, one a (values, path, step, recordings); everything that has to run is run side by side."""
         out, left = np.zeros((len(self.y), len(asked))), []
@@ -179,7 +179,7 @@ class ProbingBench(Bench):
             if probing_free.moves(self, at, path):
                 out[:, i] = probing_free.moving(self, at, path, wanted)
             elif probing_free.sensed(self, path):
-                out[:, i] = probing_free.reported(self, at, path, h, self.predict(at, wanted))
+                out[:, i] = probing_free.reported(self, at, path, h, self.runs.many([(at, wanted, self.slopes)])[0])
             else:
                 own = tuple(r for r in wanted if r == path.rsplit(".", 1)[-1]) or wanted
                 left = self.runs.many([(at, own, self.slopes), ({**at, path: at[path] + h}, own, self.slopes)])

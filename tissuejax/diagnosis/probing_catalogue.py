@@ -38,6 +38,7 @@ PRIORS = {
     "contact-offset.depth": 7e-4,
     "contact-offset.delay": 0.1,
 }
+GIVING = {"coefficient": (0.45,), "give": (2e-8,)}  # m/Pa: 500 Pa move by 10 micrometres
 
 
 def probing_entries(energy: float) -> list[Entry]:
@@ -88,7 +89,8 @@ def probing_entries(energy: float) -> list[Entry]:
             Friction(),
             (
                 Form("", ("coefficient",), {}),
-                Form("giving", ("coefficient", "give"), {}, nominated=False),
+                # where the surface sticks, a rigid stick of weak friction passes for a giving one of strong friction
+                Form("giving", ("coefficient", "give"), GIVING, nominated=False),
             ),
         ),
         (Adhesion(), (Form("", ("strength", "reach"), {"reach": (1e-4, 3e-4, 8e-4)}),)),

@@ -5,6 +5,7 @@ together in groups (few programs), and values of an effect whose amplitudes are 
 was stopped and is started again asks for the same runs in the same order and finds them on disk.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -48,6 +49,7 @@ class Runs:
         finite: which samples of its channel a segment holds.
         folder: where runs are kept; None keeps them in memory only.
         told: called after every batch with the number of runs done so far.
+        count: runs done. cost: runs asked for, done or found on disk, in those of the coarse simulation.
     """
 
     ready: dict[str, ProbingPredictor]
@@ -58,6 +60,7 @@ class Runs:
     folder: Path | None = None
     told: Callable[[int], None] = lambda _: None
     count: int = 0
+    cost: float = 0.0
     _known: dict[tuple, np.ndarray] = field(default_factory=dict)
     _models: dict[tuple, ProbingPredictor] = field(default_factory=dict)
     _told: str | None = None  # mesh, path and radius of the probe, sensors, effects, settings: all a run depends on
@@ -75,7 +78,9 @@ class Runs:
     def many(self, asked: Sequence[Asked]) -> list[Float[np.ndarray, " N"]]:
         """Predictions, one long vector each: as measured where a recording wasn't asked for, NaN where a run failed."""
         keys = [[self._key(values, r, kind) for r in recordings] for values, recordings, kind in asked]
-        missing = [k for k in dict.fromkeys(k for row in keys for k in row) if not self._find(k)]
+        new = [k for k in dict.fromkeys(k for row in keys for k in row) if k not in self._known]
+        self.cost += sum(self._price(kind) for _, kind, _ in new)
+        missing = [k for k in new if not self._find(k)]
         if missing:
             jobs = [self.job(dict(values), r, kind) for r, kind, values in missing]
             processes = self.ready[FINE].settings.processes
@@ -90,6 +95,11 @@ class Runs:
                 told[self.rows[key[0]]] = self._known[key]
             out.append(told)
         return out
+
+    def _price(self, kind: str) -> float:
+        """Elements times steps, of those of the coarse simulation."""
+        one, other = self.ready[kind].settings, self.ready[COARSE].settings
+        return math.prod(one.counts) / math.prod(other.counts) * other.compression / one.compression
 
     def job(self, values: Mapping[str, float], recording: str, kind: str) -> workers.Job:
         """What simulates one recording."""

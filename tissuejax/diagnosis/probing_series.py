@@ -1,7 +1,6 @@
 """The long vector of a probing bench: every component of force and markers as a segment, with its sigma.
 
-Sigma is noise and numerical error in quadrature. The numerical one is what mesh, step and penalty leave open, a share
-of the signal at each time (measured against refinements and another solver: 1 to 2 % of the force).
+Sigma is the stated noise. What mesh and step leave open is a part of the discrepancy (`probing_view`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,7 +11,6 @@ from tissuejax.diagnosis.bench import Segment
 from tissuejax.experiments.probing_predictor import ProbingPredictor
 from tissuejax.recordings.recording import Sample
 
-NUMERICAL = {"force": 0.012, "markers": 0.02}  # share of the signal that mesh, step and penalty leave open
 CHANNELS = ("force", "markers")
 FEWEST = 8  # samples of a series worth having
 
@@ -42,18 +40,8 @@ def series(sample: Sample, ready: ProbingPredictor) -> tuple[list[Segment], np.n
                 depth = np.maximum(touch - np.interp(time[good], t, z), 0.0)
                 segments.append(Segment(name, channel, component, rows, time[good], ch.unit, depth, "depth", "m"))
                 ys.append(flat[good, j])
-                sigmas.append(np.hypot(noise, NUMERICAL[channel] * _signal(channel, flat, j)[good]))
+                sigmas.append(np.full(int(good.sum()), noise))
     return segments, np.concatenate(ys), np.concatenate(sigmas)
-
-
-def _signal(channel: str, flat: np.ndarray, j: int) -> np.ndarray:
-    """Size of the force, or of the displacement of the marker that column j belongs to, at every time."""
-    if channel == "force":
-        return np.linalg.norm(np.nan_to_num(flat), axis=1)
-    here = flat[:, 3 * (j // 3) : 3 * (j // 3) + 3]
-    early = here[: max(len(here) // 10, 5)]
-    rest = np.nanmedian(early if np.isfinite(early).any() else here, axis=0)
-    return np.linalg.norm(np.nan_to_num(here - rest), axis=1)
 
 
 def kept_samples(sample: Sample, segments: Sequence[Segment]) -> dict[int, np.ndarray]:

@@ -16,13 +16,9 @@ from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.misfit import Misfit
 
 HOPELESS = 2e-3  # of what exceeds noise: a fit that leaves much is not polished
-HOPELESS_DEAR = 5e-4  # the same where a prediction is a simulation and valleys are flat
 NOTHING = 1e-5  # of the largest effect of a parameter, each moved by its scale: what a one-sided difference errs by
 FREE = 1e-4  # damping below which a step of a true Jacobian that gains nothing is the end
 TURN = 0.8  # rad: the longest step of an angle, a quarter of it after every step that gained nothing
-ENOUGH = 2e-3  # of chi-square: where a prediction is a simulation, a step that promises less is not taken
-FURTHER = 3  # times that a step is lengthened
-EXACT = 0.1  # of all that ends a descent, where it has to find the end of a valley
 
 
 @dataclass(frozen=True)
@@ -71,7 +67,6 @@ class Descent:
     paths: tuple[str, ...]
     recordings: tuple[str, ...]
     rest: dict[str, float]
-    exact: bool = False
 
     def __post_init__(self):
         free = [self.bench.free[p] for p in self.paths]
@@ -80,8 +75,7 @@ class Descent:
         self.high = np.array([np.log(f.upper) if f.log else f.upper for f in free])
         self.scale = np.array([1.0 if f.log else f.scale for f in free])
         # near an axis of the tests an angle has next to no slope and wants several turns: the rest must not wait for it
-        self.turns = np.array([f.unit == "rad" and not self.bench.dear for f in free], bool)
-        self.last: np.ndarray | None = None
+        self.turns = np.array([f.unit == "rad" for f in free], bool)
         self.priors = [(i, *f.prior) for i, f in enumerate(free) if f.prior is not None]
 
     def natural(self, x: np.ndarray) -> dict[str, float]:
@@ -134,9 +128,6 @@ class Descent:
         cost, r, prediction = self.objective(x)
         # a Jacobian from elsewhere may lack what vanishes there (shapes at zero amplitude): good for one step
         damping, small, age, given, first = 1e-3, 0, 0, jac is not None, True
-        dear = self.bench.dear
-        hopeless = HOPELESS_DEAR if dear else HOPELESS
-        tolerance *= EXACT if self.exact else 1.0
         for _ in range(iterations):
             if not np.isfinite(cost):
                 return x, cost, prediction, False
@@ -144,17 +135,16 @@ class Descent:
                 jac, age = self.jacobian(x), 0
             if not np.all(np.isfinite(jac)):
                 return x, cost, prediction, False
-            self.last = jac
             size = np.linalg.norm(jac, axis=0)
             # A column that is nothing but the error of a difference (a fibre along an axis: no slope in its angle) must
             # not call for a step of its own, or nothing else moves.
             nothing = size * self.scale < NOTHING * np.max(size * self.scale, initial=0.0)
-            lacking = given or (first and not dear and not np.all(size))
+            lacking = given or (first and not np.all(size))
             first = False
             q, t = np.linalg.qr(np.where(nothing, 0.0, jac))
             right = q.T @ r
             size = np.maximum(size, 1e-9 * np.max(size, initial=0.0) + 1e-6 / self.scale)
-            for tried in range(4 if dear else 10):
+            for tried in range(10):
                 reach = np.where(self.turns, TURN / 4**tried, np.inf)
                 low, high = np.maximum(self.low - x, -reach), np.minimum(self.high - x, reach)
                 a = np.vstack([t, np.diag(np.sqrt(damping) * size)])
@@ -163,12 +153,10 @@ class Descent:
                 step = trial - x
                 left = r - jac @ step
                 promised = cost - float(left @ left)
-                if dear and promised < max(tolerance, (EXACT if self.exact else 1.0) * ENOUGH * cost):
-                    return x, cost, prediction, True
                 new, r_new, p_new = self.objective(trial)
                 if new < cost or age > 0:
                     break
-                damping = max(damping * (40 if dear else 8), 1e-6)
+                damping = max(damping * 8, 1e-6)
                 if np.max(np.abs(step) / np.maximum(self.scale, np.abs(x)), initial=0.0) < 1e-9:
                     return x, cost, prediction, True
             else:
@@ -177,48 +165,28 @@ class Descent:
                 jac = None
                 continue
             drop = cost - new
-            if self.exact and drop > promised:
-                trial, new, r_new, p_new = self.longer(x, trial, (new, r_new, p_new), tolerance)
-                step, drop = trial - x, cost - new
-                left = r - jac @ step
-            true = (age == 0 and not lacking) or dear
+            true = age == 0 and not lacking
             if drop > 0.7 * promised and age < 3 and step @ step > 0 and not lacking:
                 jac, age = jac + np.outer(left - r_new, step) / (step @ step), age + 1
             else:
                 jac, given = None, False
             cost, x, r, prediction = new, trial, r_new, p_new
             damping = max(damping / 10, 1e-9)
-            tiny = drop < max(tolerance, hopeless * (cost - len(r)))
+            tiny = drop < max(tolerance, HOPELESS * (cost - len(r)))
             if tiny and not true:  # a corrected Jacobian, or one without the column of a shape, tells of no end
                 jac, given = None, False
                 continue
             small = small + 1 if tiny else 0
-            if small >= 2 or drop < 1e-3 * tolerance or (tiny and not dear and damping < FREE):
+            if small >= 2 or drop < 1e-3 * tolerance or (tiny and damping < FREE):
                 return x, cost, prediction, True
         return x, cost, prediction, False
-
-    def longer(
-        self, x: np.ndarray, trial: np.ndarray, found: tuple[float, np.ndarray, np.ndarray], tolerance: float
-    ) -> tuple[np.ndarray, float, np.ndarray, np.ndarray]:
-        """From the step x to trial on in the same direction, twice as far each time, as long as that gains.
-
-        Along a valley one-sided differences of simulations see a steeper wall than there is.
-        """
-        step = trial - x
-        for _ in range(FURTHER):
-            further = np.clip(trial + step, self.low, self.high)
-            more = self.objective(further)
-            if not more[0] < found[0] - tolerance:
-                break
-            trial, found, step = further, more, 2 * step
-        return trial, *found
 
     def errors(self, x: np.ndarray, r: np.ndarray) -> tuple[dict[str, float], tuple[str, ...]]:
         """Standard errors in natural coordinates (scaled up by an honest misfit), and the paths on a bound."""
         span = np.minimum(np.where(np.isfinite(self.high - self.low), self.high - self.low, 1.0), self.scale)
         at = (x - self.low < 1e-6 * span) | (self.high - x < 1e-6 * span)
         std = np.full(len(x), np.nan)
-        jac = self.last if self.bench.dear and self.last is not None else self.jacobian(x)
+        jac = self.jacobian(x)
         norms = np.linalg.norm(jac, axis=0)
         use = ~at & (norms > 0) & np.isfinite(norms)
         if use.any():
@@ -252,7 +220,6 @@ def refit(
     final: bool = True,
     errors: bool = True,
     seed: np.ndarray | None = None,
-    exact: bool = False,
 ) -> Refit:
     """Fit base and candidates `keys` from `start` (absent paths start at the bench's neutral values).
 
@@ -261,11 +228,10 @@ def refit(
         final: False leaves standard errors and held-out recordings out, for trial starts.
         errors: False leaves standard errors out.
         seed: the whitened Jacobian at the start (natural coordinates, without priors) where it is known.
-        exact: to the end of a flat valley: smaller gains count, and a step that gained more than it promised goes on.
     """
     whole = {**bench.start, **start}
     paths = tuple(dict.fromkeys([*bench.base, *(p for key in keys for p in bench.candidates[key].paths)]))
-    descent = Descent(bench, misfit, paths, bench.fitted, {}, exact)
+    descent = Descent(bench, misfit, paths, bench.fitted, {})
     first = descent.point(whole)
     known = None if seed is None else descent.scaled(seed, first)
     x, cost, prediction, converged = descent.run(first, iterations, tolerance, known)
@@ -277,7 +243,7 @@ def refit(
         std, at_bound = descent.errors(x, r) if errors else ({}, ())
         belong = tuple(p for key in keys for p in bench.candidates[key].held)
         if belong and bench.held_out:
-            second = Descent(bench, misfit, belong, bench.held_out, values, exact)
+            second = Descent(bench, misfit, belong, bench.held_out, values)
             y, *_ = second.run(second.point(whole), iterations, tolerance)
             own = second.natural(y)
         prediction = bench.predict({**values, **own})

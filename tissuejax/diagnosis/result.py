@@ -7,12 +7,18 @@ from importlib.metadata import version
 import numpy as np
 
 from tissuejax.cache import source
-from tissuejax.diagnosis.decide import Verdict
+from tissuejax.diagnosis.judgement.answer import Answered
+from tissuejax.diagnosis.judgement.evidence import SetEvidence
+from tissuejax.diagnosis.judgement.judge import Kind, covering
 from tissuejax.diagnosis.locate import Located, locate
 from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.remainder import over_places, remainder
-from tissuejax.diagnosis.search import Search, best_of_each
 from tissuejax.diagnosis.stiffness_map import fitted_region, regions
+
+USED = (
+    "all recordings, those called held out too, chose the set of effects; every parameter shown, and every number for "
+    "a recording held out, comes from a fit to the other recordings, with nothing fitted to the one held out"
+)
 
 
 @dataclass
@@ -21,8 +27,7 @@ class Diagnosis:
 
     Attributes:
         sample, energy: what was diagnosed with which base model.
-        search: everything tried.
-        verdict: the answer.
+        answered: all that was weighed, the judgement, and the fits that are shown.
         seconds: wall time.
         proposals: what to measure next (`next_experiment.Proposal`), best first.
         maps: of probings: where each fitted recording wants the tissue stiffer or softer (`stiffness_map`).
@@ -31,50 +36,60 @@ class Diagnosis:
 
     sample: str
     energy: str
-    search: Search
-    verdict: Verdict
+    answered: Answered
     seconds: float
     proposals: list = field(default_factory=list)
     maps: list = field(default_factory=list)
     foreseen: list = field(default_factory=list)
 
+    @property
+    def search(self) -> Answered:
+        """All that was weighed."""
+        return self.answered
+
+    @property
+    def verdict(self) -> Answered:
+        """The answer."""
+        return self.answered
+
     def located(self) -> list[Located]:
         """Where the base model misses: in time, drive, channel, and in space where maps were made."""
-        found = fitted_region(self.verdict.chosen.values, self.verdict.explained[0])
-        return [*locate(self.search.bench, self.search.empty.prediction), *found, *regions(self.maps)]
+        a = self.answered
+        found = fitted_region(a.chosen.values, a.explained[0])
+        return [*locate(a.bench, a.empty.prediction), *found, *regions(self.maps)]
 
     def as_dict(self) -> dict:
         """`result.json`."""
-        v, s = self.verdict, self.search
-        bench = s.bench
+        a, bench = self.answered, self.answered.bench
+        j = a.judgement
+        named = j.kind in (Kind.FOUND, Kind.IN_PART, Kind.AMBIGUOUS)
+        effects = self.effects(a.chosen)
+        stated = [e for e in effects if j.kind is Kind.AMBIGUOUS or e["name"] in j.names]
         return {
-            "verdict": v.kind,
-            "confidence": v.confidence,
-            "reasons": list(v.reasons),
-            "effects": self.effects(v.chosen) if v.kind in ("found", "ambiguous") else [],
-            "best_attempt": self.effects(v.chosen) if v.kind == "unexplained" else [],
+            "verdict": a.kind,
+            "confidence": a.confidence,
+            "probabilities": {k.value: p for k, p in j.probabilities.items()},
+            "inclusion": dict(j.inclusion),
+            "something_missing": j.missing,
+            "exactly_these": j.exact,
+            "reasons": [],
+            "effects": stated if named else [],
+            "best_attempt": [] if named else effects,
             "alternatives": self.alternatives(),
+            "rest": a.rest(),
             "next_experiment": [p.as_dict() for p in self.proposals],
             "located": [x.as_dict() for x in self.located()],
             "candidates": self.candidates(),
             "sets": self.sets(1000),
-            "before": self.errors(s.empty),
-            "after": self.errors(v.chosen),
+            "before": self.errors(a.empty),
+            "after": self.errors(a.chosen),
             "held_out_uncertainty": [x.as_dict() for x in self.foreseen],
             "base_parameters": self.base(),
-            "numerical_error": self.numerical(s.empty),
-            "numerical_error_after": self.numerical(v.chosen),
-            "noise": {
-                f"{r}/{c}": {
-                    "correlated_share": n.share,
-                    "correlation_time": n.tau,
-                    "over_recorded": s.misfit.levels.get((r, c)),
-                }
-                for (r, c), n in s.misfit.noises.items()
-            },
-            "explained": {"fitted": v.explained[0], "held_out": v.explained[1] if bench.held_out else None},
+            "numerical_error": self._of(()).numerical,
+            "explained": {"fitted": a.explained[0], "held_out": a.explained[1] if bench.held_out else None},
             "fitted": list(bench.fitted),
             "held_out": list(bench.held_out),
+            "used": USED,
             "sample": self.sample,
             "energy": self.energy,
             "warnings": list(bench.warnings),
@@ -83,16 +98,76 @@ class Diagnosis:
             | {"source": source.LOADED},
         }
 
-    def numerical(self, r: Refit) -> dict | None:
-        """What the simulation has wrong at a fit, where that was asked."""
-        known = self.search.bench.numerics.get(frozenset(r.keys))
-        return known.as_dict() if known else None
+    def alternatives(self) -> list[dict]:
+        """Sets that these data can't tell from the chosen one, with their probability."""
+        a = self.answered
+        if a.judgement.kind is not Kind.AMBIGUOUS:
+            return []
+        return [
+            {"effects": list(s.names), "forms": list(s.keys), "probability": p, "log_evidence": s.log_evidence}
+            for s, p in covering(a.judgement)
+        ]
+
+    def candidates(self) -> list[dict]:
+        """Every effect tried: score at the base fit, weighed alone, probability that it is there."""
+        a = self.answered
+        first = {x.key: x for x in a.scored.get(frozenset(), [])}
+        base = self._of(())
+        out = []
+        for key, c in a.bench.candidates.items():
+            x, alone = first.get(key), self._of((key,))
+            if x is None and alone is None:
+                continue
+            out.append(
+                {
+                    "name": c.name,
+                    "form": c.form,
+                    "score": x.gain if x and math.isfinite(x.gain) else None,
+                    "score_share": x.share if x else None,
+                    "refit_chi2_per_sample": alone.chi2 / alone.n if alone else None,
+                    "criterion": 2 * (base.log_evidence - alone.log_evidence) if alone else None,
+                    "held_out_chi2_per_sample": None,
+                    "most_like": None,
+                    "correlation": None,
+                    "inclusion": a.judgement.inclusion.get(c.name, 0.0),
+                    "chosen": key in a.chosen.keys,
+                }
+            )
+        return sorted(out, key=lambda c: c["criterion"] if c["criterion"] is not None else math.inf)
+
+    def _of(self, keys: tuple[str, ...]) -> SetEvidence | None:
+        found = self.answered.exploration.weighed.get(frozenset(keys))
+        return found.evidence if found and math.isfinite(found.evidence.log_evidence) else None
+
+    def sets(self, most: int = 10) -> list[dict]:
+        """The best sets of effects, each in its best form, with their evidence and probability."""
+        a, best = self.answered, {}
+        for s in a.evidence.sets:
+            name = s.label or " + ".join(sorted(s.names))
+            if not s.void and math.isfinite(s.log_evidence):
+                best[name] = max(best.get(name, s), s, key=lambda x: x.log_evidence)
+        top = max(s.log_evidence for s in best.values())
+        rows = [
+            {
+                "effects": list(s.keys) or ([s.label] if s.label else []),
+                "probability": a.judgement.posterior.get("?" if s.label else name, 0.0),
+                "log_evidence_below_best": top - s.log_evidence,
+                "criterion": 2 * (top - s.log_evidence),
+                "information_criterion": s.chi2 + s.k * math.log(s.n) if math.isfinite(s.chi2) else None,
+                "chi2_per_sample": s.chi2 / s.n,
+                "held_out_chi2_per_sample": None,
+                "rest_share_of_peak": math.sqrt(s.rest[0]),
+                "explained": s.explained,
+            }
+            for name, s in best.items()
+        ]
+        return sorted(rows, key=lambda r: -r["probability"])[:most]
 
     def effects(self, r: Refit) -> list[dict]:
         """Effects of a fit in the order in which they were added, with parameters, standard errors and units."""
-        out, free = [], self.search.bench.free
+        out, free = [], self.answered.bench.free
         for key in r.keys:
-            c = self.search.bench.candidates[key]
+            c = self.answered.bench.candidates[key]
             parameters = {
                 p: {"value": r.all[p], "std": r.std.get(p), "unit": free[p].unit, "at_bound": p in r.at_bound}
                 for p in (*c.paths, *c.held)
@@ -101,69 +176,9 @@ class Diagnosis:
             out.append({"name": c.name, "form": c.form, "parameters": parameters})
         return out
 
-    def alternatives(self) -> list[dict]:
-        """Sets that these data can't tell from the chosen one."""
-        candidates = self.search.bench.candidates
-        return [
-            {
-                "effects": [candidates[k].name for k in r.keys],
-                "forms": list(r.keys),
-                "criterion_above_chosen": self.search.criterion(r) - self.search.criterion(self.verdict.chosen),
-                "parameters": self.effects(r),
-            }
-            for r in self.verdict.rivals
-        ]
-
-    def candidates(self) -> list[dict]:
-        """Every effect tried: score at the base fit, best refit alone, in the chosen company, correlation."""
-        s = self.search
-        first = {x.key: x for x in s.scored.get(frozenset(), [])}
-        directions = {k: x.direction for k, x in first.items() if np.any(x.direction)}
-        out = []
-        for key, c in s.bench.candidates.items():
-            x, alone = first.get(key), s.refits.get(frozenset({key}))
-            if x is None and alone is None:
-                continue
-            near = {
-                k: float(abs(directions[key] @ d))
-                for k, d in directions.items()
-                if key in directions and s.bench.candidates[k].name != c.name
-            }
-            closest = max(near, key=near.get) if near else None
-            out.append(
-                {
-                    "name": c.name,
-                    "form": c.form,
-                    "score": x.gain if x else None,
-                    "score_share": x.share if x else None,
-                    "refit_chi2_per_sample": alone.chi2 / alone.n if alone else None,
-                    "criterion": s.criterion(alone) - s.criterion(s.empty) if alone else None,
-                    "held_out_chi2_per_sample": alone.held / alone.n_held if alone and alone.n_held else None,
-                    "most_like": closest,
-                    "correlation": near.get(closest) if closest else None,
-                    "chosen": key in self.verdict.chosen.keys,
-                }
-            )
-        return sorted(out, key=lambda c: c["criterion"] if c["criterion"] is not None else math.inf)
-
-    def sets(self, most: int = 10) -> list[dict]:
-        """The best sets of effects, each in its best form, with what they reach; the criterion above the best one's."""
-        s = self.search
-        best = min(s.criterion(r) for r in s.refits.values())
-        return [
-            {
-                "effects": list(s.refits[k].keys),
-                "criterion": s.criterion(s.refits[k]) - best,
-                "information_criterion": s.refits[k].chi2 + s.inside(s.refits[k]),
-                "chi2_per_sample": s.refits[k].chi2 / s.refits[k].n,
-                "held_out_chi2_per_sample": s.refits[k].held / s.refits[k].n_held if s.refits[k].n_held else None,
-            }
-            for k in best_of_each(s)[:most]
-        ]
-
     def errors(self, r: Refit) -> dict:
         """Per recording and channel: rmse, unit, chi-square per sample, number of samples, fitted or held out."""
-        bench, out = self.search.bench, {}
+        bench, out = self.answered.bench, {}
         left = bench.y - r.prediction
         for name in (*bench.fitted, *bench.held_out):
             channels = {}
@@ -183,7 +198,7 @@ class Diagnosis:
 
     def base(self) -> dict:
         """Base parameters before and after."""
-        bench, before, after = self.search.bench, self.search.empty, self.verdict.chosen
+        bench, before, after = self.answered.bench, self.answered.empty, self.answered.chosen
         return {
             p: {
                 "before": before.values[p],
@@ -197,9 +212,9 @@ class Diagnosis:
 
     def remainders(self) -> list[dict]:
         """What the chosen model leaves, as smooth functions, channel by channel."""
-        bench = self.search.bench
+        bench = self.answered.bench
         kinds = dict.fromkeys((s.channel, s.component) for s in bench.segments if "marker" not in s.component)
-        left = self.verdict.chosen.prediction
+        left = self.answered.chosen.prediction
         places = [over_places(bench, left, r) for r in (*bench.fitted, *bench.held_out)]
         smooth = [remainder(bench, left, c, k) for c, k in kinds]
         return [part.as_dict() for part in (*smooth, *places) if part is not None]

@@ -4,18 +4,16 @@ from typing import ClassVar
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from tissuejax.diagnosis.judgement.material_diagnosis import MaterialDiagnosis
 from tissuejax.diagnosis.result import Diagnosis
-from tissuejax.report.plot import FAINT, HELD, INK, MODEL, Plot, grid
+from tissuejax.report.plot import FAINT, INK, MODEL, Plot, grid
 
 MOST = 14
 
 
 class DiagnosisCandidates(Plot):
-    """The best form of every effect, alone beside the base; of judged tests its evidence, of others its refit."""
+    """The best form of every effect, alone beside the base, by its evidence."""
 
     name: ClassVar[str] = "candidates"
     subject: ClassVar[type] = Diagnosis
@@ -23,35 +21,25 @@ class DiagnosisCandidates(Plot):
 
     def prepare(self, subject: Diagnosis) -> list[dict] | None:
         """One row an effect, the best first."""
-        judged, rows, base = isinstance(subject, MaterialDiagnosis), {}, subject.search.empty
+        rows: dict[str, dict] = {}
         for c in subject.candidates():
             if c["refit_chi2_per_sample"] is None and (c["score_share"] or 0.0) < 1e-3:
                 continue
             row = rows.setdefault(c["name"], {"name": c["name"], "score": 0.0, "rank": np.inf, "chosen": False})
             row["score"] = max(row["score"], c["score_share"] or 0.0)
             row["chosen"] |= c["chosen"]
-            if judged:
-                row["present"] = c["inclusion"]
-                row["rank"] = min(row["rank"], np.inf if c["criterion"] is None else c["criterion"])
-            elif c["refit_chi2_per_sample"] is not None and c["refit_chi2_per_sample"] < row["rank"]:
-                row["rank"], row["held"] = c["refit_chi2_per_sample"], c["held_out_chi2_per_sample"]
+            row["present"] = c["inclusion"]
+            row["rank"] = min(row["rank"], np.inf if c["criterion"] is None else c["criterion"])
         found = sorted(rows.values(), key=lambda r: r["rank"])[:MOST]
-        for row in found:
-            row["base"], row["base_held"] = base.chi2 / base.n, base.held / base.n_held if base.n_held else None
         return found or None
 
     def caption(self, data: list[dict]) -> str:
         """How to read it."""
         left = "Left: share of the misfit that one linear step beside the base removes (it only nominates). "
-        if "present" in data[0]:
-            return left + (
-                "Right: how much more probable the recordings are with that effect alone beside the base than without "
-                "(natural logarithm; left of zero it is worse than nothing), and the probability that it is there at "
-                "all. Effects of the verdict in blue."
-            )
         return left + (
-            "Right: chi² per sample after a full refit with that effect alone, fitted (dots) and held out (rings). "
-            "Effects of the verdict in blue."
+            "Right: how much more probable the recordings are with that effect alone beside the base than without "
+            "(natural logarithm; left of zero it is worse than nothing), and the probability that it is there at "
+            "all. Effects of the verdict in blue."
         )
 
     def draw(self, data: list[dict]) -> Figure:
@@ -65,7 +53,7 @@ class DiagnosisCandidates(Plot):
         for ax in (left, right):
             ax.set_yticks(y, [r["name"].replace("-", " ") for r in data])
             ax.set_ylim(-0.6, len(data) - 0.4)
-        (_evidence if "present" in data[0] else _refits)(right, data, y, colours)
+        _evidence(right, data, y, colours)
         legend = {"effect of the verdict": Patch(color=MODEL), "other effect": Patch(color=FAINT)}
         legend |= {t: h for h, t in zip(*right.get_legend_handles_labels(), strict=True)}
         figure.legend(
@@ -90,21 +78,3 @@ def _evidence(ax, data: list[dict], y, colours) -> None:
             )  # fmt: skip
     ax.set_xscale("symlog", linthresh=10)
     ax.set_xlabel("gain in ln evidence over the base alone")
-
-
-def _refits(ax, data: list[dict], y, colours) -> None:
-    for i, row, colour in zip(y, data, colours, strict=True):
-        if np.isfinite(row["rank"]):
-            ax.plot(row["rank"], i, "o", color=colour, markersize=5)
-        if row.get("held") is not None:
-            ax.plot(row["held"], i, "o", markerfacecolor="none", color=colour, markersize=7)
-    ax.axvline(data[0]["base"], color=INK, linewidth=0.8, label="base, fitted")
-    if data[0]["base_held"] is not None:
-        ax.axvline(data[0]["base_held"], color=HELD, linewidth=0.8, linestyle="--", label="base, held out")
-    ax.axvline(1, color=INK, linewidth=0.6, linestyle=":", label="noise alone")
-    ax.add_line(Line2D([], [], marker="o", linestyle="", color=INK, markersize=5, label="refit, fitted"))
-    ax.add_line(
-        Line2D([], [], marker="o", linestyle="", color=INK, markerfacecolor="none", markersize=7, label="held out")
-    )
-    ax.set_xscale("log")
-    ax.set_xlabel("chi² per sample after refit")

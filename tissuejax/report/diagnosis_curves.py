@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 
 from tissuejax.diagnosis.bench import Segment
 from tissuejax.diagnosis.foreseen import prediction_std
-from tissuejax.diagnosis.judgement.material_diagnosis import MaterialDiagnosis
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.report.plot import BASE, HELD, INK, MODEL, Plot, grid, legend_below, scatter
 from tissuejax.report.scales import display, label
@@ -146,10 +145,8 @@ def _carries(bench, s: Segment) -> bool:
 
 def _half(d: Diagnosis) -> Float[np.ndarray, " N"]:
     """Half-widths: noise, errors of the estimates where a prediction costs nothing, and what any law leaves."""
-    bench = d.search.bench
-    variance = bench.sigma**2
-    if isinstance(d, MaterialDiagnosis):
-        a, keys = d.answered, frozenset(d.answered.chosen.keys)
-        variance = variance + a.rest()["rms"] ** 2
+    a, keys = d.answered, frozenset(d.answered.chosen.keys)
+    variance = a.bench.sigma**2 + a.rest_size() ** 2
+    if a.bench is a.fitting:
         variance = variance + prediction_std(a.bench, a.whitenings[keys], a.plain[keys]) ** 2
     return NORMAL_95 * np.sqrt(variance)

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from tissuejax.diagnosis.judgement.evidence import write_evidence
-from tissuejax.diagnosis.judgement.material_diagnosis import MaterialDiagnosis
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.report import diagnosis_sentences as sentences
+from tissuejax.report import judged_sentences as judged
 from tissuejax.report.headline import headline
 from tissuejax.report.page import figures, render
 from tissuejax.storage import write_bytes, write_json, write_text
@@ -27,8 +27,7 @@ def write_diagnosis(found: Diagnosis, out: Path, remainders: bool = True) -> dic
     written = {"result": write_json(out / "result.json", record)}
     if remainders:
         written["remainder"] = write_json(out / "remainder.json", found.remainders())
-    if isinstance(found, MaterialDiagnosis):
-        written["evidence"] = write_evidence(found.answered.evidence, out / "evidence.json")
+    written["evidence"] = write_evidence(found.answered.evidence, out / "evidence.json")
     drawn = figures(found)
     written |= {f["name"]: write_bytes(out / f"{f['name']}.png", f["png"]) for f in drawn}
     page = render(
@@ -37,8 +36,8 @@ def write_diagnosis(found: Diagnosis, out: Path, remainders: bool = True) -> dic
         d=found,
         record=record,
         headline=headline(found),
-        lead=sentences.lead(found),
-        sure=sentences.sure(found),
+        lead=judged.lead(found),
+        sure=judged.sure(found),
         limits=sentences.limits(found),
         parameters=sentences.parameters(found),
         base=sentences.base(found),
@@ -46,7 +45,7 @@ def write_diagnosis(found: Diagnosis, out: Path, remainders: bool = True) -> dic
         meanings=sentences.meanings(found),
         steps=sentences.next_steps(found),
         sets=found.sets(),
-        fits=len(record["sets"]) if isinstance(found, MaterialDiagnosis) else len(found.search.refits),
+        fits=len(record["sets"]),
         figures={f["name"]: f for f in drawn},
     )
     written["page"] = write_text(out / "report.html", page)

@@ -3,7 +3,7 @@
 import math
 
 from tissuejax.diagnosis.judgement.judge import Kind
-from tissuejax.diagnosis.judgement.material_diagnosis import USED, MaterialDiagnosis
+from tissuejax.diagnosis.result import USED, Diagnosis
 
 PARTS = {
     "law": "smooth in stretch, shared by recordings (another law)",
@@ -17,6 +17,8 @@ PARTS = {
     "slow": "a slow wander in time",
     "lasting": "a wander longer than a recording",
     "white": "scatter from sample to sample beyond the stated noise",
+    "marker": "each marker's own, smooth in depth",
+    "numerical": "what mesh and step of the simulation leave open",
 }
 
 
@@ -34,7 +36,7 @@ def chance(p: float) -> str:
     return f"{100 * p:.0f} in 100"
 
 
-def size(d: MaterialDiagnosis) -> str:
+def size(d: Diagnosis) -> str:
     """The rest in its unit and as a share of the peak."""
     rest = d.answered.rest()
     value, unit = rest["rms"], rest["unit"]
@@ -42,10 +44,13 @@ def size(d: MaterialDiagnosis) -> str:
         if unit == "Pa" and value >= big:
             value, unit = value / big, word
             break
-    return f"{value:.3g} {unit} root mean square, {100 * rest['share_of_peak']:.2g} % of the largest stress"
+    share = f"{100 * rest['share_of_peak']:.2g} %"
+    if unit == "1":  # forces and markers together
+        return f"{share} of the largest force and displacement, root mean square"
+    return f"{value:.3g} {unit} root mean square, {share} of the largest {'stress' if 'Pa' in unit else 'force'}"
 
 
-def lead(d: MaterialDiagnosis) -> str:
+def lead(d: Diagnosis) -> str:
     """The verdict in one or two sentences."""
     a = d.answered
     j = a.judgement
@@ -81,7 +86,7 @@ def lead(d: MaterialDiagnosis) -> str:
     )
 
 
-def sure(d: MaterialDiagnosis) -> list[str]:
+def sure(d: Diagnosis) -> list[str]:
     """How sure, in numbers."""
     a, j, out = d.answered, d.answered.judgement, []
     chances = ", ".join(f"{k.value} {chance(p)}" for k, p in sorted(j.probabilities.items(), key=lambda kv: -kv[1]))
@@ -100,9 +105,14 @@ def sure(d: MaterialDiagnosis) -> list[str]:
         held = f", {math.sqrt(c.held / c.n_held):.3g} in the held-out ones" if a.bench.held_out else ""
         out.append(f"With the effects by {math.sqrt(c.chi2 / c.n):.3g} times{held}.")
     rest = a.rest()
-    large = [f"{PARTS[k]} {100 * v:.2g} %" for k, v in rest["parts"].items() if v > 1e-3]
+    large = [f"{PARTS[k]} {100 * v:.2g} %" for k, v in rest["parts"].items() if v > 1e-3 and k != "numerical"]
     if large:
         out.append(f"What is left, by kind, as shares of the stress (typical amplitudes): {'; '.join(large)}.")
+    if j.chosen.numerical:
+        out.append(
+            f"To mesh and step of the simulation {100 * j.chosen.numerical:.2g} % of the largest values are laid, and "
+            "not to the tissue."
+        )
     if rest["kurtosis"] > 5:
         out.append(
             f"What is left jumps (excess kurtosis {rest['kurtosis']:.0f}): slips, steps or spikes are none of the "

@@ -6,7 +6,7 @@ nothing at all is fitted to it, and its error is that of the prediction.
 """
 
 import copy
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.diagnosis.bench import Bench
+from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.explore import Effort, Exploration, explore
@@ -22,6 +23,7 @@ from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.misfit import Misfit, white
 from tissuejax.diagnosis.refit import Refit, refit
 from tissuejax.diagnosis.score import Score
+from tissuejax.estimation.discrepancy import Discrepancy
 
 
 @dataclass
@@ -29,20 +31,25 @@ class Answered:
     """A judged sample, with the fits that its page shows.
 
     Attributes:
-        bench: fitted and held-out recordings as the user named them.
+        fitting: fitted and held-out recordings as the user named them; `bench` is the same in SI units.
         exploration: all that was weighed.
         judgement: the answer.
         refits: by set of keys, fitted to the fitted recordings alone.
         rest: what the chosen set leaves at each block, Pa.
     """
 
-    bench: Bench
+    fitting: Bench
     exploration: Exploration
     evidence: Evidence
     judgement: Judgement
     refits: dict[frozenset, Refit] = field(default_factory=dict)
     whitenings: dict[frozenset, Whitening] = field(default_factory=dict)
     plain: dict[frozenset, Refit] = field(default_factory=dict)
+
+    @property
+    def bench(self) -> Bench:
+        """What pages show: measurements in SI units, candidates, warnings."""
+        return self.fitting.shown
 
     @property
     def kind(self) -> str:
@@ -110,13 +117,19 @@ class Answered:
         whole = sum(squares.values())
         return {
             "rms": float(np.sqrt(whole / np.sum(blocks))),
-            "unit": self.bench.segments[0].unit,
+            "unit": self.bench.segments[0].unit if self.bench is self.fitting else "1",
             "share_of_peak": float(np.sqrt(whole / np.sum(blocks))) / peak,
             "negligible": self.judgement.negligible,
             "recordings": {n: x / whole if whole else 0.0 for n, x in squares.items()},
             "parts": dict(s.amplitudes),
             "kurtosis": s.kurtosis,
         }
+
+    def rest_size(self) -> Float[np.ndarray, " N"]:
+        """Root mean square of the rest at every sample, SI: the same share of every channel."""
+        n = len(self.fitting.y)
+        unit = self.fitting.natural(np.ones(n)) - self.fitting.natural(np.zeros(n))
+        return self.rest()["share_of_peak"] * self.exploration.scales.peak * unit
 
 
 def _share(before: float, after: float) -> float:
@@ -126,7 +139,8 @@ def _share(before: float, after: float) -> float:
 def answer(
     bench: Bench,
     whole: Bench,
-    modes: Mapping[str, object],
+    cut: Blocks,
+    of: Discrepancy,
     effort: Effort | None = None,
     report: Callable[[str], None] | None = None,
     criteria: Criteria | None = None,
@@ -135,9 +149,9 @@ def answer(
 
     Args:
         bench: with recordings held out; `whole`: the same sample with all of them fitted.
-        modes: kind of test by recording.
+        cut, of: block means of both, and the discrepancy that any model leaves of them.
     """
-    found = explore(whole, modes, criteria, effort, report)
+    found = explore(whole, cut, of, criteria, effort, report)
     evidence = found.evidence(bench.fitted, bench.held_out)
     judgement = judge(evidence, criteria)
     shown = copy.copy(bench)
@@ -153,14 +167,20 @@ def answer(
 
 def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
     """The fit of a set to the fitted recordings alone, and its misfit over the stated noise; remembered."""
-    weighed, scales, bench = out.exploration.weighed[frozenset(keys)], out.exploration.scales, out.bench
+    weighed, scales = out.exploration.weighed[frozenset(keys)], out.exploration.scales
+    start = {p: v for p, v in weighed.refit.values.items() if p in out.fitting.free}
+    bench = out.fitting.anchored(start)
     whitening = Whitening(bench, scales.cut, scales.blocked, weighed.parts, weighed.v)
-    misfit = whitening if keys else white(bench)
-    start = {p: v for p, v in weighed.refit.values.items() if p in bench.free}
+    misfit = whitening if keys or bench is not out.fitting else white(bench)
     fit = refit(bench, misfit, keys, start)
+    near = bench.anchored(fit.values)
+    if near is not bench:
+        fit = replace(fit, prediction=near.predict(fit.values))
     out.plain[frozenset(keys)], out.whitenings[frozenset(keys)] = fit, whitening
-    z = (bench.y - fit.prediction) / bench.sigma
-    inside, outside = bench.mask(bench.fitted), bench.mask(bench.held_out)
+    shown = out.bench
+    fit = replace(fit, prediction=bench.natural(fit.prediction))
+    z = (shown.y - fit.prediction) / shown.sigma
+    inside, outside = shown.mask(shown.fitted), shown.mask(shown.held_out)
     out.refits[frozenset(keys)] = replace(
         fit,
         chi2=squares(z[inside]),

@@ -53,13 +53,13 @@ def smoothed(y: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     return np.interp(np.arange(len(y)), 0.5 * (edges[:-1] + edges[1:] - 1), means)
 
 
-def blocks(bench: Bench, total: int = 480, least: int = 30, most: int = 100) -> Blocks:
-    """Blocks of all segments: about `total` in all, `least` to `most` a segment."""
-    several = int(np.clip(total // max(len(bench.segments), 1), least, most))
+def blocks(bench: Bench, several: Mapping[str, int] | None = None) -> Blocks:
+    """Blocks of all segments: `several` of each channel's, by default 480 in all and 30 to 100 a segment."""
+    usual = int(np.clip(480 // max(len(bench.segments), 1), 30, 100))
     starts, owner = [], []
     for k, s in enumerate(bench.segments):
         n = len(s.time)
-        wanted = min(several, n)
+        wanted = min((several or {}).get(s.channel, usual), n)
         way = (np.linspace(0, 1, n) + path(s.drive) + path(smoothed(bench.y[s.rows]))) / 3
         which = np.minimum((way * wanted).astype(int), wanted - 1) if wanted < n else np.arange(n)
         first = np.flatnonzero(np.diff(which, prepend=-1))

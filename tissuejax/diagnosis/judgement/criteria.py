@@ -16,7 +16,9 @@ class Criteria:
         unknown: probability that something acts that neither the catalogue nor an ordinary discrepancy has. Ground: as
             likely as two effects at once; taken off the others in proportion.
         shares: standard deviation of the half-normal prior of a discrepancy's amplitude, a share of the stress, by
-            family. Ground: what the best published laws leave of careful recordings, 1 to 4 % of the peak in all.
+            family. Ground: what the best published laws leave of careful recordings, 1 to 4 % of the peak in all; of a
+            marker, of what it moved (it is not quite where it was registered); of the numerical error, in units of
+            what mesh and step leave open by Richardson's extrapolation.
         strange: the same where something unknown acts, by which factor more. Ground: 10 makes of 1 to 2 % the 10 to
             20 % by which effects of the catalogue change a recording.
         change: standard deviation of the half-normal (two-sided: normal) prior of an effect's amplitude: the change of
@@ -34,7 +36,10 @@ class Criteria:
     sizes: tuple[float, ...] = (0.4, 0.4, 0.15, 0.05)
     unknown: float = 0.1
     shares: Mapping[str, float] = field(
-        default_factory=lambda: {"law": 0.015, "gain": 0.015, "hysteresis": 0.01, "slow": 0.01, "white": 0.005}
+        default_factory=lambda: (
+            {"law": 0.015, "gain": 0.015, "hysteresis": 0.01, "slow": 0.01, "white": 0.005}
+            | {"marker": 0.02, "numerical": 1.0}
+        )
     )
     strange: float = 10.0
     change: float = 0.3

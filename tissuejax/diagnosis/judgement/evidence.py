@@ -35,7 +35,7 @@ class SetEvidence:
         rest: mean square of the discrepancy left, as a share of the squared peak, and its standard deviation.
         held: root mean square error of the recordings called held out over their noise, parameters fitted on the
             others alone; None where there are none or it wasn't asked for.
-        numerical: share of the misfit that the simulation's own error may be; 0 for closed forms.
+        numerical: root mean square of what is laid to mesh and step of a simulation, a share of the peak.
     """
 
     keys: tuple[str, ...]

@@ -14,17 +14,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tissuejax.diagnosis.bench import Bench
-from tissuejax.diagnosis.judgement.blocks import Blocks, blocks, series
+from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.judge import log_prior
 from tissuejax.diagnosis.judgement.marginal import Blocked
-from tissuejax.diagnosis.judgement.weigh import Scales, Weighed, squared, weigh
+from tissuejax.diagnosis.judgement.weigh import ROUNDS, Scales, Weighed, squared, weigh
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.score import Score, complement, gain, trusted
 from tissuejax.diagnosis.starts import distinct, inside
 from tissuejax.errors import NotConverged
-from tissuejax.estimation.discrepancy import Series, discrepancy
+from tissuejax.estimation.discrepancy import Discrepancy
 
 UNKNOWN = "unknown"
 HOPEFUL = 8.0  # nats below the best set up to which other forms and further effects of a set are tried
@@ -44,6 +44,8 @@ class Effort:
         starts: settings of the shapes that a set is begun from.
         spend: cost of all predictions (of the plain base model each) after which nothing new is begun.
         burden: searches and memories nested in a prediction at most.
+        rounds, iterations: of fit and amplitudes in turn, and of a fit.
+        stepwise: a second effect is sought only where a first one has come in.
     """
 
     most: int = 3
@@ -55,6 +57,9 @@ class Effort:
     starts: int = 2
     spend: float = 4e4
     burden: int = 2
+    rounds: int = ROUNDS
+    iterations: int = 12
+    stepwise: bool = False
 
 
 @dataclass
@@ -133,6 +138,7 @@ class Exploration:
             starts = [first.refit.values or starts[0]]
             options = {"v": first.v, **options} if first.refit.values else options
         floor = self.weighed[self.best].evidence.log_evidence - GIVEN_UP
+        options = {"rounds": self.effort.rounds, "iterations": self.effort.iterations, **options}
         found = weigh(self.scales, order, starts[0], self.criteria, floor=floor, **options)
         old = self.weighed.get(key)
         if old is None or found.evidence.log_evidence > old.evidence.log_evidence:
@@ -283,7 +289,8 @@ class Exploration:
 
 def explore(
     bench: Bench,
-    modes: Mapping[str, object],
+    cut: Blocks,
+    of: Discrepancy,
     criteria: Criteria | None = None,
     effort: Effort | None = None,
     report: Callable[[str], None] | None = None,
@@ -292,15 +299,15 @@ def explore(
 
     Args:
         bench: with all recordings fitted.
-        modes: by recording, what kind of test it is; recordings of a mode share a law.
+        cut: block means of what was measured; of: the discrepancy that any model leaves of them.
 
     Raises:
         NotConverged: the base model can't be fitted at all.
     """
     criteria, effort = criteria or Criteria(), effort or Effort()
-    cut = blocks(bench)
     start = {p: bench.start[p] for p in bench.base}
-    scales = scaled(bench, cut, series(bench, cut, modes), bench.y, start)
+    bench = bench.anchored(start)
+    scales = scaled(bench, cut, of, bench.y, start)
     e = Exploration(bench, criteria, effort, scales, report or (lambda _: None))
     base = weigh(scales, (), start, criteria)
     if not np.isfinite(base.evidence.log_evidence):
@@ -309,6 +316,7 @@ def explore(
             "parameters tried; name another --energy, or leave out the samples of largest strain"
         )
     scales.values, scales.reference = base.refit.values, scales.cut.mean(base.refit.prediction)
+    scales.bench = e.bench = bench.anchored(base.refit.values)
     e.weighed[frozenset()] = base
     e.extend([frozenset()], effort.singles, effort.singles)
     for key in e.near(1)[: effort.reshaped[0]]:
@@ -318,6 +326,8 @@ def explore(
         parents = e.near(size)[: effort.parents[size - 1]]
         if size >= effort.most or not parents or (size == 2 and len(e.best) < 2):
             break  # a third effect is sought where a second one has come in
+        if effort.stepwise and len(e.best) < size:
+            break
         e.extend(parents, most, max(most // len(parents), 1) + 2)
         for key in e.near(size + 1)[: effort.reshaped[size]]:
             e.reshape(key)
@@ -325,14 +335,12 @@ def explore(
     return e
 
 
-def scaled(
-    bench: Bench, cut: Blocks, seen: Sequence[Series], prediction: np.ndarray, values: Mapping[str, float]
-) -> Scales:
+def scaled(bench: Bench, cut: Blocks, of: Discrepancy, prediction: np.ndarray, values: Mapping[str, float]) -> Scales:
     """The scales of a sample about the base's fit."""
     sigma = cut.spread(bench.sigma)
     edges = np.flatnonzero(np.diff(cut.owner, prepend=-1))
     rows = tuple(slice(int(a), int(b)) for a, b in zip(edges, [*edges[1:], len(sigma)], strict=True))
-    of = discrepancy(seen, sigma)
-    families = tuple(p.family for p in of.about(sigma))
-    peak = max(s.peak for s in seen)
-    return Scales(bench, of, families, cut, Blocked(rows, sigma), values, cut.mean(prediction), peak)
+    peak = max(float(np.quantile(np.abs(bench.y[s.rows]), 0.98)) for s in bench.segments) or 1.0
+    made = Scales(bench, of, (), cut, Blocked(rows, sigma), values, cut.mean(prediction), peak)
+    made.families = tuple(p.family for p in made.about(bench.sigma, bench))
+    return made

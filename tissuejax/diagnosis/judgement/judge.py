@@ -79,9 +79,10 @@ def log_prior(s: SetEvidence, forms: Mapping[str, int], criteria: Criteria) -> f
 
 
 def negligible(s: SetEvidence, criteria: Criteria) -> float:
-    """Probability that the rest's root mean square is below `Criteria.negligible` of the peak."""
+    """Probability that the rest's root mean square is below `Criteria.negligible` of the peak, beside what
+    is laid to the simulation: a rest as small as that says nothing of the tissue."""
     mean, std = s.rest
-    return float(norm.cdf((criteria.negligible**2 - mean) / max(std, 1e-300)))
+    return float(norm.cdf((criteria.negligible**2 + s.numerical**2 - mean) / max(std, 1e-300)))
 
 
 def judge(evidence: Evidence, criteria: Criteria | None = None) -> Judgement:

@@ -59,9 +59,12 @@ class Scales:
     reference: Float[np.ndarray, " M"]
     peak: float
 
-    def about(self, prediction: Float[np.ndarray, " N"]) -> tuple[Part, ...]:
-        """The discrepancy's parts beside a prediction (a long vector)."""
-        return self.discrepancy.about(np.nan_to_num(self.cut.mean(prediction)))
+    def about(self, prediction: Float[np.ndarray, " N"], bench: Bench) -> tuple[Part, ...]:
+        """The discrepancy's parts beside a prediction (a long vector), and what the simulation has wrong there."""
+        parts = self.discrepancy.about(np.nan_to_num(self.cut.mean(prediction)))
+        if bench.numerical is None:
+            return parts
+        return (*parts, Part("numerical", "numerical", self.cut.mean(bench.numerical)))
 
     def priors(self, criteria: Criteria, wide: Mapping[str, float]) -> Float[np.ndarray, " K"]:
         """Prior widths of the amplitudes; `wide` gives families another one."""
@@ -181,7 +184,8 @@ def weigh(
     bench, priors = with_priors(scales, keys, start, criteria)
     y, best = scales.cut.mean(bench.y), None
     at, tolerance, raw = dict(start), 0.5, None
-    parts = scales.about(bench.predict(at))
+    bench = bench.anchored(at)
+    parts = scales.about(bench.predict(at), bench)
     for _turn in range(rounds):
         misfit = Whitening(bench, scales.cut, scales.blocked, parts, v)
         seed = None if raw is None else misfit.whiten_means(raw)
@@ -198,7 +202,12 @@ def weigh(
         jac = raw * np.where(descent.log, [fit.values[p] for p in descent.paths], 1.0)
         if not np.isfinite(squared(jac / scales.blocked.sigma[:, None])):
             break  # a prediction without a slope, or with one beyond all numbers: no density is to be had there
-        residual, parts = y - scales.cut.mean(fit.prediction), scales.about(fit.prediction)
+        near = bench.anchored(fit.values)
+        if near is not bench:
+            bench, fit = near, replace(fit, prediction=near.predict(fit.values))
+        if not np.isfinite(squared(fit.prediction)):
+            break
+        residual, parts = y - scales.cut.mean(fit.prediction), scales.about(fit.prediction, bench)
         prior = [priors.get(p) for p in descent.paths]
         weak = np.array([0.0 if p is None else p[1] ** -2 for p in prior])
         offset = np.array([0.0 if p is None else a - p[0] for a, p in zip(x, prior, strict=True)])
@@ -219,7 +228,7 @@ def weigh(
         total = value + held + occam
         if best is None or total > best[0] + 1e-6:
             gained = math.inf if best is None else total - best[0]
-            best = (total, value + held, occam, fit, v, m, bound, descent, residual, parts)
+            best = (total, value + held, occam, fit, v, m, bound, descent, residual, parts, bench)
         else:
             break
         if gained < SETTLED or total < floor:
@@ -270,11 +279,10 @@ def _impossible(scales: Scales, keys: Sequence[str], label: str) -> Weighed:
 
 
 def _described(scales: Scales, keys: Sequence[str], label: str, best: tuple) -> Weighed:
-    total, value, occam, fit, v, m, bound, descent, residual, parts = best
-    bench = scales.bench
+    total, value, occam, fit, v, m, bound, descent, residual, parts, bench = best
     smoothed, scatter = _rest(scales, parts, v, residual)
     chi2 = float(np.sum((residual / scales.blocked.sigma) ** 2))
-    before = scales.cut.mean(bench.y - bench.predict(scales.values)) / scales.blocked.sigma
+    before = scales.cut.mean(bench.y - scales.bench.predict(scales.values)) / scales.blocked.sigma
     n = len(residual)
     base = max(float(before @ before) - n, 1e-9)
     whitened = Whitening(bench, scales.cut, scales.blocked, parts, v).residual(fit.prediction, bench.fitted)
@@ -303,8 +311,15 @@ def _described(scales: Scales, keys: Sequence[str], label: str, best: tuple) -> 
         kurtosis=float(kurtosis(whitened)),
         explained=float(np.clip(1 - max(chi2 - n, 0.0) / base, -1.0, 1.0)),
         rest=(float(np.mean(smoothed**2 + scatter)) / scales.peak**2, _wobble(smoothed, scatter, scales.peak)),
+        numerical=_numerical(scales, parts, v),
     )
     return Weighed(evidence, fit, v, parts, smoothed)
+
+
+def _numerical(scales: Scales, parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> float:
+    """Root mean square of what is laid to mesh and step, a share of the peak."""
+    squares = [x * np.mean(np.sum(p.factor**2, axis=1)) for p, x in zip(parts, v, strict=True) if p.name == "numerical"]
+    return math.sqrt(float(sum(squares))) / scales.peak
 
 
 def _resting(c: Candidate, fit: Refit, bench: Bench, at_bound: Sequence[str], v: np.ndarray, families) -> bool:
@@ -324,7 +339,8 @@ def _idle(c: Candidate, fit: Refit, bench: Bench, peak: float) -> bool:
 
 
 def _rest(scales: Scales, parts: Sequence[Part], v: Float[np.ndarray, " K"], residual: Float[np.ndarray, " M"]):
-    """Posterior mean and variance of the discrepancy at the blocks, scatter from sample to sample left out."""
+    """Posterior mean and variance of the discrepancy at the blocks, without scatter from sample to sample and without
+    the known error of a simulation (its variance is that of both together)."""
     white = np.array([p.family == "white" for p in parts])
     noise = Blocked(scales.blocked.rows, scales.blocked.sigma)
     inverse = [np.linalg.inv(b) for b in noise.within(parts, v)]
@@ -337,7 +353,8 @@ def _rest(scales: Scales, parts: Sequence[Part], v: Float[np.ndarray, " K"], res
     scattered = noise.within([p for p, x in zip(parts, white, strict=True) if x], v[white])
     errors = np.concatenate([np.diag(s) for s in scattered])
     own = np.concatenate([np.diag(i) for i in inverse]) - np.sum((g @ inner) * g, axis=1)
-    return residual - errors * w, np.maximum(errors - errors**2 * own, 0.0)
+    known = [x * p.factor @ (p.factor.T @ w) for p, x in zip(parts, v, strict=True) if p.family == "numerical"]
+    return residual - errors * w - sum(known), np.maximum(errors - errors**2 * own, 0.0)
 
 
 def _wobble(mean: np.ndarray, variance: np.ndarray, peak: float) -> float:
