@@ -147,6 +147,24 @@ def test_slopes_of_the_marginal_are_difference_quotients():
         assert slope[k] == pytest.approx((up - down) / 2e-8, rel=2e-3), parts[k].name
 
 
+def test_the_information_is_the_trace_of_the_dense_matrices():
+    """1/2 tr(P B_a P B_b) by dense algebra, for one series (between series P is taken as block-diagonal)."""
+    linear, parts, blocked = made()
+    n = len(linear.residual) // 2
+    half = [
+        dataclasses.replace(p, factor=p.factor[:n]) if p.factor is not None else dataclasses.replace(p, within=p.within[:1])
+        for p in parts
+    ]
+    one = Linear(linear.residual[:n], linear.jacobian[:n], linear.offset, linear.weak)
+    v = np.geomspace(1e-5, 1e-3, len(parts))
+    found = marginal(one, half, v, Blocked((slice(0, n),), blocked.sigma[:n]))
+    b = [p.factor @ p.factor.T if p.factor is not None else p.within[0] for p in half]
+    covariance = np.diag(blocked.sigma[:n] ** 2) + sum(x * m for x, m in zip(v, b, strict=True))
+    p = np.linalg.inv(covariance + one.jacobian @ np.diag(1 / one.weak) @ one.jacobian.T)
+    expected = [[0.5 * np.trace(p @ x @ p @ y) for y in b] for x in b]
+    np.testing.assert_allclose(found.fisher, expected, rtol=1e-5)
+
+
 def test_amplitudes_find_the_gain_that_was_put_in_and_rest_where_nothing_is():
     linear, parts, blocked = made()
     widths = np.full(len(parts), 0.02)
@@ -163,7 +181,7 @@ def test_the_mass_over_one_amplitude_is_its_integral():
     linear, parts, blocked = made(n=40)
     part, width = parts[2:3], np.array([0.02])
     v, _ = amplitudes(linear, part, width, blocked, width**2)
-    m = marginal(linear, part, v, blocked, fisher=True)
+    m = marginal(linear, part, v, blocked)
     a = np.linspace(0, 0.15, 1200)
     logs = np.array([marginal(linear, part, np.array([x**2]), blocked).value for x in a])
     logs += 0.5 * math.log(2 / math.pi) - math.log(0.02) - 0.5 * (a / 0.02) ** 2

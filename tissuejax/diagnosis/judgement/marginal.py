@@ -15,8 +15,9 @@ and Raftery 1995, JASA 90, sec. 4.1.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
@@ -47,20 +48,32 @@ class Linear:
 
 @dataclass(frozen=True)
 class Marginal:
-    """Log evidence at given squared amplitudes, its slope and Fisher information in them.
+    """Log evidence at given squared amplitudes; its slope and Fisher information in them are worked out when asked for.
 
     Attributes:
         value: without priors of the amplitudes; 2 pi is in it for the measurements, not for the parameters.
-        slope, fisher: first derivative by the squared amplitudes, and the expected second one.
         precision: H.
         step: delta at the maximum.
     """
 
     value: float
-    slope: Float[np.ndarray, " K"]
-    fisher: Float[np.ndarray, "K K"] | None
     precision: Float[np.ndarray, "p p"]
     step: Float[np.ndarray, " p"]
+    _derivatives: Callable[[], tuple[np.ndarray, np.ndarray]] = field(repr=False)
+
+    @cached_property
+    def _both(self) -> tuple[np.ndarray, np.ndarray]:
+        return self._derivatives()
+
+    @property
+    def slope(self) -> Float[np.ndarray, " K"]:
+        """First derivative by the squared amplitudes."""
+        return self._both[0]
+
+    @property
+    def fisher(self) -> Float[np.ndarray, "K K"]:
+        """Expected second derivative, sign turned; between blocks P is taken as block-diagonal for two parts within."""
+        return self._both[1]
 
 
 @dataclass(frozen=True)
@@ -87,9 +100,11 @@ def inverted(block: Float[np.ndarray, "n n"]) -> tuple[Float[np.ndarray, "n n"],
     c, info = dpotrf(block, lower=1)
     if info:
         raise np.linalg.LinAlgError("a covariance is not positive definite")
-    inverse, _ = dpotri(c, lower=1)
-    low = np.tril(inverse)
-    return low + np.tril(low, -1).T, 2 * float(np.sum(np.log(np.diag(c))))
+    low, _ = dpotri(c, lower=1)  # the other triangle is zero
+    log_det = 2 * float(np.sum(np.log(np.diag(c))))
+    whole = low + low.T
+    whole.flat[:: len(block) + 1] *= 0.5
+    return whole, log_det
 
 
 def smooth(parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> Float[np.ndarray, "N q"]:
@@ -99,9 +114,7 @@ def smooth(parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> Float[np.ndarra
     return np.concatenate(acting, axis=1) if acting else np.zeros((n, 0))
 
 
-def marginal(
-    linear: Linear, parts: Sequence[Part], v: Float[np.ndarray, " K"], blocked: Blocked, fisher: bool = False
-) -> Marginal:
+def marginal(linear: Linear, parts: Sequence[Part], v: Float[np.ndarray, " K"], blocked: Blocked) -> Marginal:
     """See the module's text."""
     inverse, log_det = zip(*(inverted(b) for b in blocked.within(parts, v)), strict=True)
 
@@ -125,46 +138,52 @@ def marginal(
     # |M| = |I + U'D^-1U| |H|, and |K| = |D| |I + U'D^-1U|
     own = 2 * float(np.sum(np.log(np.diag(c[0])) - np.log(size)))
     value = -0.5 * (quadratic + sum(log_det) + own + len(dr) * math.log(2 * math.pi))
-    half = g @ (size[:, None] * cho_solve(c, np.diag(size), check_finite=False))  # g M^-1
 
-    def project(x: np.ndarray) -> np.ndarray:
-        return solve(x) - half @ (g.T @ x)
+    def derivatives() -> tuple[np.ndarray, np.ndarray]:
+        half = g @ (size[:, None] * cho_solve(c, np.diag(size), check_finite=False))  # g M^-1
+        return _derivatives(parts, blocked, inverse, g, half, left)
 
-    slope, moved = [], []
-    for part in parts:
-        if part.factor is not None:
-            moved.append(project(part.factor))
-            trace, gained = np.sum(moved[-1] * part.factor), np.sum((part.factor.T @ left) ** 2)
-        else:
-            moved.append(None)
-            trace = gained = 0.0
-            for i, rows, block in zip(inverse, blocked.rows, part.within, strict=True):
-                trace += np.sum(i * block) - np.sum((block @ g[rows]) * half[rows])
-                gained += left[rows] @ block @ left[rows]
-        slope.append(0.5 * float(gained - trace))
-    information = _fisher(parts, moved, inverse, g, half, blocked) if fisher else None
     schur = m[q:, q:]
     if q:
         schur = schur - m[q:, :q] @ np.linalg.solve(m[:q, :q], m[:q, q:])
-    return Marginal(value, np.array(slope), information, schur, found[q:])
+    return Marginal(value, schur, found[q:], derivatives)
 
 
-def _fisher(parts, moved, inverse, g, half, blocked: Blocked) -> Float[np.ndarray, "K K"]:
-    """1/2 tr(P B_a P B_b); between blocks of two block-diagonal parts P is taken as block-diagonal."""
-    own = [i - half[rows] @ g[rows].T for i, rows in zip(inverse, blocked.rows, strict=True)]
-    inner = [None if p.within is None else [o @ b for o, b in zip(own, p.within, strict=True)] for p in parts]
-    out = np.zeros((len(parts), len(parts)))
-    for a, one in enumerate(parts):
-        for b, other in enumerate(parts[: a + 1]):
-            if one.factor is not None and other.factor is not None:
-                t = np.sum((one.factor.T @ moved[b]) ** 2)
-            elif one.factor is None and other.factor is None:
-                t = sum(np.sum(x * y.T) for x, y in zip(inner[a], inner[b], strict=True))
-            else:
-                x, blocks = (moved[a], other.within) if one.factor is not None else (moved[b], one.within)
-                t = sum(np.sum((y @ x[r]) * x[r]) for y, r in zip(blocks, blocked.rows, strict=True))
-            out[a, b] = out[b, a] = 0.5 * float(t)
-    return out
+def _derivatives(
+    parts: Sequence[Part],
+    blocked: Blocked,
+    inverse: Sequence[Float[np.ndarray, "n n"]],
+    g: Float[np.ndarray, "N w"],
+    half: Float[np.ndarray, "N w"],
+    left: Float[np.ndarray, " N"],
+) -> tuple[Float[np.ndarray, " K"], Float[np.ndarray, "K K"]]:
+    """Slope 1/2 (z'B z - tr P B), z = K^-1 r, and Fisher information 1/2 tr(P B_a P B_b), with P = D^-1 - half g'."""
+    soft = [k for k, part in enumerate(parts) if part.factor is not None]
+    hard = [k for k, part in enumerate(parts) if part.factor is None]
+    slope, fisher = np.zeros(len(parts)), np.zeros((len(parts), len(parts)))
+    u = np.concatenate([parts[k].factor for k in soft], axis=1) if soft else np.zeros((len(left), 0))
+    edges = np.cumsum([0, *(parts[k].factor.shape[1] for k in soft)])[:-1]
+    light = np.concatenate([i @ u[rows] for i, rows in zip(inverse, blocked.rows, strict=True)])
+    moved = light - half @ (g.T @ u)  # P U
+    if soft:
+        trace = np.add.reduceat(np.sum(moved * u, axis=0), edges)
+        slope[soft] = np.add.reduceat((u.T @ left) ** 2, edges) - trace
+        square = np.add.reduceat(np.add.reduceat((u.T @ moved) ** 2, edges, axis=0), edges, axis=1)
+        fisher[np.ix_(soft, soft)] = 0.5 * (square + square.T)
+    for i, (own, rows) in enumerate(zip(inverse, blocked.rows, strict=True)):
+        n = len(own)
+        within = np.stack([parts[k].within[i] for k in hard]) if hard else np.zeros((0, n, n))
+        p = own - half[rows] @ g[rows].T
+        slope[hard] += (within @ left[rows]) @ left[rows] - within.reshape(-1, n * n) @ p.ravel()
+        crossed = within @ p
+        turned = crossed.transpose(0, 2, 1).reshape(-1, n * n)
+        fisher[np.ix_(hard, hard)] += crossed.reshape(-1, n * n) @ turned.T
+        for k, block in zip(hard, within, strict=True):
+            if soft:
+                mixed = np.add.reduceat(np.sum((block @ moved[rows]) * moved[rows], axis=0), edges)
+                fisher[k, soft] += mixed
+                fisher[soft, k] += mixed
+    return 0.5 * slope, 0.5 * fisher
 
 
 def amplitudes(
@@ -186,7 +205,7 @@ def amplitudes(
         return m.value - 0.5 * float(np.sum(u))
 
     u = np.clip(start / unit, 0.0, 100.0)
-    m = marginal(linear, parts, u * unit, blocked, fisher=True)
+    m = marginal(linear, parts, u * unit, blocked)
     for _ in range(most):
         g, f = m.slope * unit - 0.5, m.fisher * np.outer(unit, unit)
         size = 1 / np.sqrt(np.diag(f) + 1e-12)
@@ -201,7 +220,7 @@ def amplitudes(
         if float(g @ step) < tolerance:
             break
         for _ in range(6):
-            trial = marginal(linear, parts, (u + step) * unit, blocked, fisher=True)
+            trial = marginal(linear, parts, (u + step) * unit, blocked)
             gained = worth(trial, u + step) - worth(m, u)
             if gained > 0:
                 break
