@@ -152,7 +152,9 @@ def test_the_information_is_the_trace_of_the_dense_matrices():
     linear, parts, blocked = made()
     n = len(linear.residual) // 2
     half = [
-        dataclasses.replace(p, factor=p.factor[:n]) if p.factor is not None else dataclasses.replace(p, within=p.within[:1])
+        dataclasses.replace(p, factor=p.factor[:n])
+        if p.factor is not None
+        else dataclasses.replace(p, within=p.within[:1])
         for p in parts
     ]
     one = Linear(linear.residual[:n], linear.jacobian[:n], linear.offset, linear.weak)

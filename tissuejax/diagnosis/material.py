@@ -32,6 +32,7 @@ from tissuejax.recordings.recording import Sample
 
 MEMORIES = ("viscoelasticity", "softening")
 CYCLES = 2.5  # periods that the longest recording must hold to show one
+SHORTEST = 128  # samples that a series is lengthened to
 STEP = 1e-6  # of a parameter's scale
 SIZE = 10.0  # by which the base's defaults may be off before they are brought to size
 STRESS = 0.05  # of the largest stress: the least scale of a modulus or an offset
@@ -64,8 +65,8 @@ def compiled(model: Model) -> Callable[[Float[Array, " p"], MaterialTest], Float
 
 
 def lengthened(test: MaterialTest) -> MaterialTest:
-    """`test` with its last sample repeated up to 1024, 2048, ... samples: few lengths, few compilations."""
-    extra = max(1024, 2 ** math.ceil(math.log2(len(test.time)))) - len(test.time)
+    """`test` with its last sample repeated up to 128, 256, 512, ... samples: few lengths, few compilations."""
+    extra = max(SHORTEST, 2 ** math.ceil(math.log2(len(test.time)))) - len(test.time)
 
     def longer(series: np.ndarray) -> np.ndarray:
         return np.concatenate([series, np.repeat(series[-1:], extra, axis=0)])

@@ -36,7 +36,8 @@ class Protocol:
         directions: specimens are loaded along several directions.
         sides: pulled and pressed.
         sizes: specimens differ in size.
-        several: there are several recordings.
+        repeated: several recordings load one direction in one kind of test. Where every mode is recorded once, a
+            stiffness of each recording's own is a law that fails to carry from mode to mode.
 
     Derived: `constraints` (some test holds what a change of volume would move), `unlike` (specimens or modes that the
     same rig loads unlike).
@@ -49,7 +50,7 @@ class Protocol:
     directions: bool
     sides: bool
     sizes: bool
-    several: bool
+    repeated: bool
 
     @property
     def constraints(self) -> bool:
@@ -68,9 +69,7 @@ class Protocol:
         drives = [d for r in recordings for d in driven(r)]
         moves = [motion(t, x) for t, x in drives]
         quick = [m[1] for m in moves if m[1] > 0]
-        directions = {
-            tuple(np.round(np.asarray(r.attributes.get("direction", (0, 0, 0)), float), 6)) for r in recordings
-        }
+        directions = {mode(r)[1] for r in recordings}
         kinds = frozenset(r.experiment for r in recordings)
         back = any(m[0] for m in moves)
         return cls(
@@ -81,8 +80,13 @@ class Protocol:
             directions=len(directions) > 1 or "biaxial" in kinds,
             sides=any(np.min(x) < -1e-3 for _, x in drives) and any(np.max(x) > 1e-3 for _, x in drives),
             sizes=len({(r.attributes.get("area"), r.attributes.get("height")) for r in recordings}) > 1,
-            several=len(recordings) > 1,
+            repeated=len({mode(r) for r in recordings}) < len(recordings),
         )
+
+
+def mode(r: Recording) -> tuple:
+    """What kind of test it is, and along which direction."""
+    return r.experiment, tuple(np.round(np.asarray(r.attributes.get("direction", (0, 0, 0)), float), 6))
 
 
 def driven(r: Recording) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -114,14 +118,14 @@ LACKING: Mapping[str, str] = {  # property of a protocol: what is said where it 
     "unlike": "one specimen in one mode can't tell the rig's compliance from the tissue's",
     "reversed": "nothing is unloaded",
     "rates": "ramps at one rate, without holds",
-    "several": "there is one recording",
+    "repeated": "no mode was recorded more than once",
 }
 
 
 def needs() -> dict[str, str]:
     """By name, the property of a protocol that an answer needs; what needs none is not in it."""
     declared = {name: effect.needs for name, effect in effects("homogeneous").items() if effect.needs}
-    return declared | {SCATTER.name: "several", HYSTERESIS.name: "reversed"}
+    return declared | {SCATTER.name: "repeated", HYSTERESIS.name: "reversed"}
 
 
 def offered(

@@ -113,6 +113,15 @@ class Exploration:
         top = self.worth(self.best)
         return [k for k in self.ranked(size) if self.worth(k) > top - HOPEFUL]
 
+    def parents(self, size: int) -> list[frozenset]:
+        """Sets to grow: those near the top; all of `ranked` as long as something unknown is likelier than any name."""
+        return self.ranked(size) if self.strange else self.near(size)
+
+    @property
+    def strange(self) -> bool:
+        """Whether something unknown is more probable than every set so far."""
+        return self.worth(frozenset({UNKNOWN})) > self.worth(self.best)
+
     @property
     def best(self) -> frozenset:
         """The most probable of all sets of known effects."""
@@ -213,9 +222,7 @@ class Exploration:
         """Weigh sets with one effect more: the best nominees of every parent in turn."""
         lists = []
         for key in parents:
-            free = [
-                c for c in self.bench.candidates.values() if c.name not in self.names(key) and self.strained(key, c)
-            ]
+            free = [c for c in self.bench.candidates.values() if c.widens and c.name not in self.names(key)]
             seen = {c.name: [Score(c.key, math.inf, 0.0, {}, {}, np.zeros(0), ((0.0, {}, {}),))] for c in free}
             for s in self.score(key):
                 if s.gain < (LITTLE if not key else 0.0):
@@ -231,12 +238,6 @@ class Exploration:
                 tried.add(company)
                 if self._grown(key, score) is not None:
                     most -= 1
-
-    def strained(self, key: frozenset, c) -> bool:
-        """Whether a part that the candidate widens is larger at a set's fit than it usually is."""
-        usual = self.scales.priors(self.criteria, {}) ** 2
-        v = self.weighed[key].v
-        return any(x > u for f, x, u in zip(self.scales.families, v, usual, strict=True) if f in c.widens)
 
     def _grown(self, key: frozenset, score: Score) -> Weighed | None:
         parent, candidate = self.weighed[key], self.bench.candidates[score.key]
@@ -323,9 +324,9 @@ def explore(
         e.reshape(key)
     e.unknown()
     for size, most in ((1, effort.pairs), (2, effort.triples)):
-        parents = e.near(size)[: effort.parents[size - 1]]
-        if size >= effort.most or not parents or (size == 2 and len(e.best) < 2):
-            break  # a third effect is sought where a second one has come in
+        parents = e.parents(size)[: effort.parents[size - 1]]
+        if size >= effort.most or not parents or (size == 2 and len(e.best) < 2 and not e.strange):
+            break  # a third effect is sought where a second one has come in, or where no name is likely yet
         if effort.stepwise and len(e.best) < size:
             break
         e.extend(parents, most, max(most // len(parents), 1) + 2)
