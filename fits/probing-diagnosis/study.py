@@ -20,7 +20,11 @@ from tissuejax.report.page import write_figures
 from tissuejax.storage import write_json
 
 CASES = ("p01", "p02", "p03", "p04")
-NAMES = {"viscoelasticity": "viscoelasticity", "breathing": "periodic", "stiff inclusion": "inclusion"}  # key: ours
+NAMES = {
+    "viscoelasticity": "viscoelasticity",
+    "breathing": "support-motion",
+    "stiff inclusion": "inclusion",
+}  # key: ours
 
 
 def main(folder: Path) -> str:

@@ -59,8 +59,12 @@ def test_what_acts_in_one_recording_is_run_in_that_one(bench):
     [
         ("effects.contact-offset.depth.a", 3e-4, {}),
         ("effects.machine-compliance.compliance", 5e-4, {}),
-        ("effects.periodic.sin.a", 3e-4, {"effects.periodic.frequency": 0.9}),
-        ("effects.periodic.frequency", 0.05, {"effects.periodic.sin.a": 3e-4, "effects.periodic.frequency": 0.9}),
+        ("effects.support-motion.sin.a", 3e-4, {"effects.support-motion.frequency": 0.9}),
+        (
+            "effects.support-motion.frequency",
+            0.05,
+            {"effects.support-motion.sin.a": 3e-4, "effects.support-motion.frequency": 0.9},
+        ),
     ],
 )
 def test_motion_of_probe_support_and_rig_needs_no_run_of_its_own(bench, path, step, more):
@@ -99,7 +103,7 @@ def test_derivatives_can_be_asked_of_the_mesh_that_counts(bench, monkeypatch, pa
 def test_sensors_are_blind_to_each_other(bench):
     at = bench.at(VALUES)
     origin = bench.predict(VALUES)
-    for path, blind in (("effects.drift.offset_z", "markers"), ("effects.clock-lag.lag", "force")):
+    for path, blind in (("effects.force-drift.offset_z", "markers"), ("effects.clock-lag.lag", "force")):
         change = probing_free.reported(bench, {path: 0.0} | at, path, 1e-3, origin)
         for s in bench.segments:
             if s.channel == blind:

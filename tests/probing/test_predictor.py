@@ -87,12 +87,12 @@ def test_derivatives_equal_difference_quotients():
     names = (
         "friction",
         "viscoelasticity",
-        "periodic",
+        "support-motion",
         "inclusion",
         "contact-offset",
         "registration",
         "clock-lag",
-        "drift",
+        "force-drift",
     )
     p = predictor(model(*every_effect(*names)), sample(), settings=PRECISE)
     values = p.model.defaults | VALUES
@@ -103,7 +103,7 @@ def test_derivatives_equal_difference_quotients():
     }
     # a sampled path has corners, and a step that falls on one has one-sided derivatives only (8 % apart at no delay)
     values |= {"effects.contact-offset.delay": 1.3e-3}
-    values |= {"effects.periodic.sin.r1": 3e-4, "effects.clock-lag.lag": 0.02, "effects.registration.turn": 0.1}
+    values |= {"effects.support-motion.sin.r1": 3e-4, "effects.clock-lag.lag": 0.02, "effects.registration.turn": 0.1}
     bare = p.model.across(())
     from tissuejax.experiments.homogeneous import local
 
@@ -136,10 +136,15 @@ def test_half_the_compression_tells_the_error_of_the_compression():
     assert np.linalg.norm(told - true) < 0.5 * np.linalg.norm(true)
 
 
+def test_an_effect_of_another_kind_of_experiment_is_refused_with_those_that_act():
+    with pytest.raises(InputError, match="drift does nothing in probings; what can act there: .*force-drift"):
+        predictor(model(suited("drift", "homogeneous")), sample(), settings=QUICK)
+
+
 def test_jacobian_has_a_column_for_each_path_and_zero_where_it_does_not_act(monkeypatch):
     """The bookkeeping of columns, recordings and programs, with a stand-in for the simulation."""
     two = sample(recording("a"), recording("b", place=(-0.004, 0.004)))
-    p = predictor(model(suited("drift", "probing", separate=True)), two, settings=QUICK)
+    p = predictor(model(suited("force-drift", "probing", separate=True)), two, settings=QUICK)
     sizes = []
 
     def stand_in(jobs, processes):
@@ -153,8 +158,8 @@ def test_jacobian_has_a_column_for_each_path_and_zero_where_it_does_not_act(monk
         return out
 
     monkeypatch.setattr(workers, "run_all", stand_in)
-    axes = [f"effects.drift.{what}_{c}" for what in ("offset", "rate") for c in "xyz"]
-    paths = [f"{axis}.a" for axis in axes] + ["energy.C10", "effects.drift.offset_z.b"]
+    axes = [f"effects.force-drift.{what}_{c}" for what in ("offset", "rate") for c in "xyz"]
+    paths = [f"{axis}.a" for axis in axes] + ["energy.C10", "effects.force-drift.offset_z.b"]
     _, slopes = p.jacobian(VALUES, paths)
     assert max(sizes) <= QUICK.tangents
     assert sum(sizes) == 7 + 2

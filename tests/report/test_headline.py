@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from tissuejax.effects.catalogue import effect, effects
+from tissuejax.effects.catalogue import effects
 from tissuejax.report.effect_words import Found, clauses, said
 from tissuejax.report.headline import errors, pooled
 
@@ -72,5 +72,4 @@ def test_every_effect_says_what_its_parameters_mean(name):
 
 
 def variants(name):
-    plain = effects()[name](**RICH.get(name, {}))
-    return [plain, effect(name, kind="probing")] if name in ("drift", "periodic") else [plain]
+    return [effects()[name](**RICH.get(name, {}))]

@@ -133,7 +133,7 @@ def test_the_whole_top_keeps_its_distance_from_the_rim():
     [
         ("softening", {"m": 50.0, "r": 0.3}),
         ("base-slip", {"compliance": 1e-6}),
-        ("periodic", {"sin": 1e-3}),
+        ("support-motion", {"sin": 1e-3}),
         ("compressibility", {"drained": 1e-4}),
     ],
 )
@@ -144,7 +144,7 @@ def test_what_cannot_be_tabulated_is_refused_by_its_name(name, values):
     from tissuejax.surrogate.refusals import refuse
 
     kind = members(effects, Effect)[name]
-    effect = kind(kind="probing") if name == "periodic" else kind()
+    effect = kind()
     amounts = {f"effects.{name}.{k}": v for k, v in values.items()}
     with pytest.raises(InputError, match=f"effect {name} can't be tabulated.*--direct"):
         refuse(made.matter(effect, **amounts), made.SMALL, [0.0, 0.0])

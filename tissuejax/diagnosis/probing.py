@@ -23,7 +23,7 @@ from tissuejax.diagnosis import probing_free
 from tissuejax.diagnosis.bench import Bench, Candidate, Free
 from tissuejax.diagnosis.catalogue import Entry
 from tissuejax.diagnosis.periodogram import lines
-from tissuejax.diagnosis.probing_catalogue import PRIORS, places, probing_entries
+from tissuejax.diagnosis.probing_catalogue import places, probing_entries
 from tissuejax.diagnosis.probing_runs import COARSE, FINE, ROUGH, Runs
 from tissuejax.diagnosis.probing_series import kept_samples, series
 from tissuejax.energies.catalogue import volumetric
@@ -107,7 +107,8 @@ class ProbingBench(Bench):
             self.start[path] *= ratio if self.free[path].unit == "Pa" else 1.0
         tests = [setup.test for setup in self.ready.setups.values()]
         session = max(float(t.start) for t in tests) + max(float(np.max(s.time)) for s in self.segments)
-        priors = PRIORS | {"aging.rate": AGED / session}
+        priors = {f"{n}.{k}": v for n, e in every.items() for k, v in e.misjudged.items()}
+        priors |= {"aging.rate": AGED / session}
         mu, height = ratio * float(guess), float(max(t.height for t in tests))
         # a base gives way by as much as the tissue over it: no fixed length a pascal is small for soft and stiff alike
         scales = {"base-slip.compliance": 0.2 * height / mu, "base-slip.fluidity": 0.04 * height / mu}
@@ -206,11 +207,11 @@ class ProbingBench(Bench):
 
     def settings(self, candidate: Candidate, prediction: Float[np.ndarray, " N"]) -> Sequence[Mapping[str, float]]:
         """Frequencies from the markers' periodogram (from the force without markers); inclusions under every site."""
-        if candidate.name == "periodic":
+        if candidate.name == "support-motion":
             vertical = [s for s in self.segments if s.recording in self.fitted and s.component.endswith("z")]
             marks = [s for s in vertical if s.channel == "markers"] or vertical
             series = [(s.time - s.time[0], (self.y - prediction)[s.rows] / self.sigma[s.rows]) for s in marks]
-            return [{"effects.periodic.frequency": f} for f in lines(series, 1)]
+            return [{"effects.support-motion.frequency": f} for f in lines(series, 1)]
         if candidate.name == "inclusion":
             return places(self.sites, {n: float(self.ready.setups[n].test.height) for n in self.fitted})
         return candidate.grid

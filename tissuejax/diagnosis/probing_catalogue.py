@@ -1,7 +1,7 @@
 """Candidates of probings: the effects in their forms, with priors on what a careful experimenter misjudges at most.
 
-Gravity is not among them. Its size is known (9.81 m/s^2): it is nothing to be found but something to be told, a model
-with the effect `gravity` fixed at that value. As a candidate it would cost a stress-free shape for every run.
+An effect that is not named here has one form, with all its parameters and the shapes of its grid. Gravity is no
+candidate: its size is known (9.81 m/s^2), so it is told (`--with gravity`) and not looked for.
 """
 
 import numpy as np
@@ -11,33 +11,20 @@ from tissuejax.diagnosis.catalogue import Entry, Form
 from tissuejax.effects.adhesion import Adhesion
 from tissuejax.effects.aging import Aging
 from tissuejax.effects.anisotropy import Anisotropy
-from tissuejax.effects.base_slip import BaseSlip
-from tissuejax.effects.capsule import Capsule
 from tissuejax.effects.catalogue import effects
-from tissuejax.effects.clock_lag import ClockLag
 from tissuejax.effects.compressibility import Compressibility
 from tissuejax.effects.contact_offset import ContactOffset
-from tissuejax.effects.drift import Drift
 from tissuejax.effects.effect import Effect
 from tissuejax.effects.energy_form import EnergyForm
+from tissuejax.effects.force_drift import ForceDrift
 from tissuejax.effects.friction import Friction
 from tissuejax.effects.inclusion import Inclusion
 from tissuejax.effects.machine_compliance import MachineCompliance
-from tissuejax.effects.periodic import Periodic
 from tissuejax.effects.registration import Registration
 from tissuejax.effects.softening import Softening
+from tissuejax.effects.support_motion import SupportMotion
 from tissuejax.effects.viscoelasticity import Viscoelasticity
 
-# standard deviations of what may be misjudged: without them a probe moved by 2.5 mm explains an inclusion
-PRIORS = {
-    "registration.dx": 7e-4,
-    "registration.dy": 7e-4,
-    "registration.radius": 3e-4,
-    "registration.thickness": 0.05,
-    "registration.turn": 0.1,
-    "contact-offset.depth": 7e-4,
-    "contact-offset.delay": 0.1,
-}
 GIVING = {"coefficient": (0.45,), "give": (2e-8,)}  # m/Pa: 500 Pa move by 10 micrometres
 
 
@@ -48,36 +35,30 @@ def probing_entries(energy: float) -> list[Entry]:
         energy: typical strain energy under the probe, Pa.
     """
     wave = ("sin", "cos", "sin2", "cos2")
-    axes = [f"{a}_{c}" for a in ("offset", "rate") for c in "xyz"]
-    found: list[tuple[Effect, tuple[Form, ...]]] = [
-        (
+    axes = ForceDrift().amplitudes
+    special: dict[str, tuple[Effect, tuple[Form, ...]]] = {
+        "viscoelasticity": (
             Viscoelasticity(terms=2),
             (
                 Form("one time", ("g1", "tau1"), {"tau1": (0.4, 4.0)}, nominated=False),
                 Form("two times", ("g1", "g2", "tau1", "tau2"), {"tau1": (0.5,), "tau2": (6.0,)}),
             ),
         ),
-        (Softening(), (Form("", ("r", "m"), {"m": (0.05 * energy, 0.4 * energy)}),)),
-        (
-            Anisotropy(),
-            (Form("", ("k1", "angle"), {"angle": tuple(np.arange(4) * np.pi / 4)}),),
+        "softening": (Softening(), (Form("", ("r", "m"), {"m": (0.05 * energy, 0.4 * energy)}),)),
+        "anisotropy": (Anisotropy(), (Form("", ("k1", "angle"), {"angle": tuple(np.arange(4) * np.pi / 4)}),)),
+        "energy-form": (EnergyForm(terms=("C30", "C01")), (Form("", ("C30", "C01"), {}),)),
+        "compressibility": (Compressibility(), (Form("draining", ("drained", "time"), {"time": (4.0,)}),)),
+        "aging": (Aging(), (Form("", ("rate",), {}),)),
+        "force-drift": (
+            ForceDrift(separate=True),
+            (Form("", axes, {}), Form("each recording", axes, {}, each=axes)),
         ),
-        (EnergyForm(terms=("C30", "C01")), (Form("", ("C30", "C01"), {}),)),
-        (Compressibility(), (Form("draining", ("drained", "time"), {"time": (4.0,)}),)),
-        (Aging(), (Form("", ("rate",), {}),)),
-        (
-            Drift(kind="probing", separate=True),
-            (
-                Form("", tuple(axes), {}),
-                Form("each recording", tuple(axes), {}, each=tuple(axes)),
-            ),
-        ),
-        (
-            Periodic(kind="probing", separate=True),
+        "support-motion": (
+            SupportMotion(),
             (Form("", (*wave, "lean_x", "lean_y", "frequency"), {}, each=wave),),
         ),
-        (MachineCompliance(), (Form("", ("compliance",), {}),)),
-        (
+        "machine-compliance": (MachineCompliance(), (Form("", ("compliance",), {}),)),
+        "contact-offset": (
             ContactOffset(separate=True),
             (
                 Form("delay", ("delay",), {}),
@@ -85,7 +66,7 @@ def probing_entries(energy: float) -> list[Entry]:
                 Form("each recording", ("depth",), {}, each=("depth",)),
             ),
         ),
-        (
+        "friction": (
             Friction(),
             (
                 Form("", ("coefficient",), {}),
@@ -93,11 +74,8 @@ def probing_entries(energy: float) -> list[Entry]:
                 Form("giving", ("coefficient", "give"), GIVING, nominated=False),
             ),
         ),
-        (Adhesion(), (Form("", ("strength", "reach"), {"reach": (1e-4, 3e-4, 8e-4)}),)),
-        (Capsule(), (Form("", ("stiffness",), {}),)),
-        (BaseSlip(), (Form("", ("compliance", "fluidity"), {}),)),
-        (ClockLag(), (Form("", ("lag",), {}),)),
-        (
+        "adhesion": (Adhesion(), (Form("", ("strength", "reach"), {"reach": (1e-4, 3e-4, 8e-4)}),)),
+        "registration": (
             Registration(),
             (
                 Form("place", ("dx", "dy"), {}),
@@ -106,16 +84,26 @@ def probing_entries(energy: float) -> list[Entry]:
                 Form("thickness", ("thickness",), {}),
             ),
         ),
-        (
+        "inclusion": (
             Inclusion(),
             (
                 Form("round", ("contrast", "x", "y", "z", "radius"), {"radius": (6e-3,)}),
                 Form("flat", ("contrast", "x", "y", "z", "radius", "flatness"), {}, nominated=False),
             ),
         ),
-    ]
-    known = effects("probing")
-    return [Entry(effect, forms, effect.name) for effect, forms in found if effect.name in known]
+    }
+    out = []
+    for name, kind in effects("probing").items():
+        if name in special:
+            effect, forms = special[name]
+        else:
+            effect = kind()
+            free = tuple(p.name for p in effect.parameters if not p.frozen)
+            each = tuple(p.name for p in effect.parameters if p.each)
+            forms = (Form("", free, dict(effect.grid), each=each),)
+        if kind.candidate:
+            out.append(Entry(effect, forms, name))
+    return out
 
 
 def places(

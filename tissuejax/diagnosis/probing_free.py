@@ -22,7 +22,6 @@ from tissuejax.recordings.recording import Channel
 if TYPE_CHECKING:
     from tissuejax.diagnosis.probing import ProbingBench
 
-MEMORIES = {"viscoelasticity", "softening", "compressibility", "friction", "adhesion", "base-slip"}
 ASIDE = {
     "x": ("effects.registration.dx", 3e-4),
     "y": ("effects.registration.dy", 3e-4),
@@ -34,7 +33,7 @@ MOVERS = {
     "effects.contact-offset.depth",
     "effects.contact-offset.delay",
     "effects.machine-compliance.compliance",
-    *(f"effects.periodic.{w}" for w in ("sin", "cos", "sin2", "cos2", "lean_x", "lean_y", "frequency")),
+    *(f"effects.support-motion.{w}" for w in ("sin", "cos", "sin2", "cos2", "lean_x", "lean_y", "frequency")),
 }
 
 
@@ -42,9 +41,11 @@ def sensed(bench: "ProbingBench", path: str) -> bool:
     """Whether a parameter only changes what the sensors report."""
     if not path.startswith("effects."):
         return False
-    effect = bench.runs.effects[path.split(".")[1]]
-    silent = type(effect).scene is Effect.scene and type(effect).energy is Effect.energy
-    return silent or path == "effects.registration.turn"
+    return _silent(bench.runs.effects[path.split(".")[1]]) or path == "effects.registration.turn"
+
+
+def _silent(effect: Effect) -> bool:
+    return type(effect).scene is Effect.scene and type(effect).energy is Effect.energy
 
 
 def moves(bench: "ProbingBench", at: Mapping[str, float], path: str) -> bool:
@@ -52,7 +53,7 @@ def moves(bench: "ProbingBench", at: Mapping[str, float], path: str) -> bool:
     if ".".join(path.split(".")[:3]) not in MOVERS:
         return False
     on = {p.split(".")[1] for p, v in at.items() if p.startswith("effects.") and v != 0 and _amplitude(bench, p)}
-    return not on & MEMORIES
+    return not any(type(bench.runs.effects[n]).remembers and not _silent(bench.runs.effects[n]) for n in on)
 
 
 def _amplitude(bench: "ProbingBench", path: str) -> bool:
@@ -98,7 +99,7 @@ def moving(bench: "ProbingBench", at: Mapping[str, float], path: str, wanted: tu
                 for axis, way in motion.items():
                     out[s.rows] += slope[axis][s.rows] * way(s.time)
                 way = motion.get(s.component[-1])
-                if path.startswith("effects.periodic.") and s.channel == "markers" and way is not None:
+                if path.startswith("effects.support-motion.") and s.channel == "markers" and way is not None:
                     out[s.rows] -= way(s.time) - _calm(bench, r, way)
     return out
 
@@ -111,7 +112,7 @@ def _calm(bench: "ProbingBench", recording: str, way) -> float:
 
 
 def _wave(at: Mapping[str, float], name: str, time: np.ndarray) -> np.ndarray:
-    angle = 2 * np.pi * at["effects.periodic.frequency"] * time * (2 if name.endswith("2") else 1)
+    angle = 2 * np.pi * at["effects.support-motion.frequency"] * time * (2 if name.endswith("2") else 1)
     return np.sin(angle) if name.startswith("sin") else np.cos(angle)
 
 
@@ -120,7 +121,7 @@ def _lift(at: Mapping[str, float], recording: str, time: np.ndarray) -> tuple[np
     out, slope = np.zeros(len(time)), np.zeros(len(time))
     turned = {"sin": ("cos", 1), "cos": ("sin", -1), "sin2": ("cos2", 2), "cos2": ("sin2", -2)}
     for name, (other, factor) in turned.items():
-        a = at.get(f"effects.periodic.{name}.{recording}", at.get(f"effects.periodic.{name}", 0.0))
+        a = at.get(f"effects.support-motion.{name}.{recording}", at.get(f"effects.support-motion.{name}", 0.0))
         out += a * _wave(at, name, time)
         slope += a * factor * 2 * np.pi * time * _wave(at, other, time)
     return out, slope
@@ -133,10 +134,10 @@ def _motion(bench: "ProbingBench", at: Mapping[str, float], path: str, recording
         return {name[1]: lambda t: np.ones_like(t)}
     if name == "depth":
         return {"z": lambda t: -np.ones_like(t)}
-    if path.startswith("effects.periodic."):
+    if path.startswith("effects.support-motion."):
         if name.startswith("lean"):
             return {name[-1]: lambda t: -_lift(at, recording, t)[0]}
-        lean = {c: at.get(f"effects.periodic.lean_{c}", 0.0) for c in "xy"} | {"z": 1.0}
+        lean = {c: at.get(f"effects.support-motion.lean_{c}", 0.0) for c in "xy"} | {"z": 1.0}
         if name == "frequency":
             return {c: (lambda t, k=k: -k * _lift(at, recording, t)[1]) for c, k in lean.items()}
         return {c: (lambda t, k=k: -k * _wave(at, name, t)) for c, k in lean.items()}

@@ -25,7 +25,16 @@ from tissuejax.storage import replacing
 
 # The first group is in every program. Histories are dear in run time and stay apart.
 GROUPS = (
-    ("aging", "clock-lag", "contact-offset", "drift", "inclusion", "machine-compliance", "periodic", "registration"),
+    (
+        "aging",
+        "clock-lag",
+        "contact-offset",
+        "force-drift",
+        "inclusion",
+        "machine-compliance",
+        "registration",
+        "support-motion",
+    ),
     ("base-slip", "capsule"),
     ("compressibility", "softening", "viscoelasticity"),
     ("adhesion", "friction"),

@@ -28,6 +28,7 @@ class Aging(Effect):
 
     name: ClassVar[str] = "aging"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    remembers: ClassVar[bool] = False
     reveals: ClassVar[str] = "later recordings stiffer or softer than earlier ones"
     blind: ClassVar[str] = "a single short recording"
     words: ClassVar[tuple[str, ...]] = ("stiffness changes by {rate:%} a second",)

@@ -28,6 +28,7 @@ class Anisotropy(Effect):
 
     name: ClassVar[str] = "anisotropy"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    remembers: ClassVar[bool] = False
     reveals: ClassVar[str] = "stiffness that differs between directions"
     blind: ClassVar[str] = "uniaxial recordings in a single direction"
     words: ClassVar[tuple[str, ...]] = ("fibres of {k1} run at {angle} to x", "stiffening with k2 {k2}")

@@ -31,10 +31,9 @@ def effect(name: str, **options) -> Effect:
 
 
 def suited(name: str, kind: str, **options) -> Effect:
-    """The effect called `name` as it acts in experiments of `kind`: some have other parameters in a probing.
+    """The effect called `name`, for experiments of `kind`.
 
     Raises:
         InputError: no such effect, or one that can't act there.
     """
-    member = lookup("effect", name, effects(kind))
-    return member(**options, **({"kind": kind} if "kind" in member.__dataclass_fields__ else {}))
+    return lookup("effect", name, effects(kind))(**options)

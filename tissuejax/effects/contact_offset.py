@@ -22,6 +22,8 @@ class ContactOffset(Effect):
 
     name: ClassVar[str] = "contact-offset"
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    remembers: ClassVar[bool] = False
+    misjudged: ClassVar[Mapping[str, float]] = {"depth": 7e-4, "delay": 0.1}
     reveals: ClassVar[str] = "force begins too early or too late, by the same depth on the way in and out"
     blind: ClassVar[str] = "one approach at one speed can't tell depth from delay; material tests"
     words: ClassVar[tuple[str, ...]] = ("the probe was {depth} deeper than recorded", "its clock is {delay} late")

@@ -42,6 +42,11 @@ class Effect(eqx.Module):
         order: place among the effects of a model, whatever the order in which they were added; rig 0, tissue 1,
             damage of tissue before its relaxation (2).
         isotropic: False if the strain energy depends on direction.
+        remembers: of probings: False if the state depends on where the probe is now and not on how it came there; then
+            what moves the probe needs no run of its own (`diagnosis.probing_free`).
+        misjudged: by parameter, how far a careful experimenter misjudges it, standard deviation in its unit: the prior
+            of an effect that only corrects what was noted.
+        candidate: False if its size is known beforehand (weight): nothing to be found, but something to be told.
 
     Hooks, in the order in which a material test applies them; each is the identity unless overridden:
         `stretch` (rig: what the specimen really saw), `energy` (added strain energy), `volume` (volume ratio from mean
@@ -62,6 +67,9 @@ class Effect(eqx.Module):
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {}
     order: ClassVar[int] = 1
     isotropic: ClassVar[bool] = True
+    remembers: ClassVar[bool] = True
+    misjudged: ClassVar[Mapping[str, float]] = {}
+    candidate: ClassVar[bool] = True
 
     @property
     @abc.abstractmethod

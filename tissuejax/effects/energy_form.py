@@ -27,6 +27,7 @@ class EnergyForm(Effect):
 
     name: ClassVar[str] = "energy-form"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    remembers: ClassVar[bool] = False
     reveals: ClassVar[str] = "misfit that depends on stretch alone, not on its past or rate"
     blind: ClassVar[str] = "small strains"
     words: ClassVar[tuple[str, ...]] = (

@@ -24,6 +24,8 @@ class Gravity(Effect):
 
     name: ClassVar[str] = "gravity"
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    remembers: ClassVar[bool] = False
+    candidate: ClassVar[bool] = False
     reveals: ClassVar[str] = "tissue that seems stiffer towards the support and softer at its free sides"
     blind: ClassVar[str] = "samples whose sag is small against the depth; material tests"
     words: ClassVar[tuple[str, ...]] = ("it weighs with {acceleration}",)

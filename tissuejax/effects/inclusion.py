@@ -23,6 +23,7 @@ class Inclusion(Effect):
 
     name: ClassVar[str] = "inclusion"
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    remembers: ClassVar[bool] = False
     reveals: ClassVar[str] = "one site stiffer or softer than the rest, the more the deeper the probe"
     blind: ClassVar[str] = "sites farther off than about twice its depth; material tests"
     words: ClassVar[tuple[str, ...]] = (

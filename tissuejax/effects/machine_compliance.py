@@ -28,6 +28,7 @@ class MachineCompliance(Effect):
 
     name: ClassVar[str] = "machine-compliance"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    remembers: ClassVar[bool] = False
     reveals: ClassVar[str] = "apparent stiffness that falls with load; specimens of unlike size disagree"
     blind: ClassVar[str] = "one specimen in one mode"
     words: ClassVar[tuple[str, ...]] = ("the rig gives way by {compliance}",)

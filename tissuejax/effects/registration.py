@@ -24,6 +24,14 @@ class Registration(Effect):
 
     name: ClassVar[str] = "registration"
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    remembers: ClassVar[bool] = False
+    misjudged: ClassVar[Mapping[str, float]] = {
+        "dx": 7e-4,
+        "dy": 7e-4,
+        "radius": 3e-4,
+        "thickness": 0.05,
+        "turn": 0.1,
+    }
     reveals: ClassVar[str] = "lateral forces and marker patterns that belong to a place beside the recorded one"
     blind: ClassVar[str] = "a level surface without markers; material tests"
     words: ClassVar[tuple[str, ...]] = (

@@ -8,6 +8,7 @@ import equinox as eqx
 from jaxtyping import Array
 
 from tissuejax import experiments as package
+from tissuejax.effects.catalogue import effects
 from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.catalogue import experiment
 from tissuejax.families import lookup, members
@@ -15,6 +16,7 @@ from tissuejax.model import Model
 from tissuejax.parameters import Values
 from tissuejax.recordings.recording import Recording, Sample
 
+WORDS = {"homogeneous": "material tests", "probing": "probings", "cutting": "cuts"}
 Tangents = dict[str, dict[str, dict[str, Array]]]
 
 
@@ -75,7 +77,7 @@ def predictor(model: Model, sample: Sample, names: Sequence[str] | None = None, 
         options: passed to the predictor (mesh and time step of a probing).
 
     Raises:
-        InputError: an unknown recording, none at all, or recordings of different kinds.
+        InputError: an unknown recording, none at all, recordings of different kinds, or an effect of another kind.
     """
     names = tuple(sample.recordings if names is None else names)
     for name in names:
@@ -86,4 +88,10 @@ def predictor(model: Model, sample: Sample, names: Sequence[str] | None = None, 
         found = ", ".join(f"{name} ({kind})" for name, kind in kinds.items()) or "none"
         raise InputError(f"recordings of one kind can be predicted together, got {found}; choose with names")
     kind = next(iter(kinds.values()))
+    for effect in model.effects:
+        if kind not in effect.kinds:
+            known = ", ".join(sorted(effects(kind)))
+            raise InputError(
+                f"effect {effect.name} does nothing in {WORDS.get(kind, kind)}; what can act there: {known}"
+            )
     return lookup("kind of experiment", kind, members(package, Predictor)).prepare(model, sample, names, **options)

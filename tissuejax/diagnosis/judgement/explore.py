@@ -243,7 +243,7 @@ class Exploration:
         parent, candidate = self.weighed[key], self.bench.candidates[score.key]
         starts = [
             {**parent.refit.values, **setting, **inside(self.bench, candidate, step, setting, parent.refit.values)}
-            for _, step, setting in distinct(score, self.effort.starts, whole=not key)
+            for _, step, setting in distinct(score, self.effort.starts, whole=not key and self.effort.starts > 1)
         ]
         return self.weigh((*parent.evidence.keys, score.key), starts)
 

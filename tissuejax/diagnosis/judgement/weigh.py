@@ -2,7 +2,8 @@
 
 Parameters of the base have flat priors, the same in every set. An effect's amplitude has a normal prior about neutral,
 one-sided where the effect is; its width is in terms of what it does: the amplitude that changes the stress by
-`Criteria.change` of it (derivative at neutral, at the base fit). So one number serves gaps, moduli and rates. Positive
+`Criteria.change` of it (derivative at neutral, at the base fit). So one number serves gaps, moduli and rates; an effect
+that only corrects what was noted says itself how far that may be wrong (`Effect.misjudged`). Positive
 shapes have normal priors of their logarithms. Fit and amplitudes of the discrepancy are found in turn.
 """
 
@@ -117,8 +118,8 @@ def with_priors(
         c = bench.candidates[key]
         sizes = scales.effect_size(c, {**bench.start, **start}, criteria)
         middle = {p: [g[p] for g in c.grid if p in g] for p in c.shapes}
-        for path in c.amplitudes:
-            priors[path] = (bench.start[path], sizes[path])
+        for path in c.amplitudes:  # of what only corrects what was noted, how far that may be wrong
+            priors[path] = free[path].prior or (bench.start[path], sizes[path])
         for path in c.shapes:
             f, scanned = free[path], middle[path] or [bench.start[path]]
             if f.log:
