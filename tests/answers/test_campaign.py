@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from tests.specimens import recording
+from tissuejax.campaign.child import Child
 from tissuejax.campaign.run import begin, go_on, status, table
 from tissuejax.campaign.store import Store
 from tissuejax.campaign.task import Settings, TooLong, limited
@@ -100,6 +101,102 @@ def test_the_limit_rings():
     with limited(0.05):
         pass
     time.sleep(0.1)
+
+
+def test_a_problem_file_asks_it_of_every_sample(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    rows = [f"{s},{l},{mu * (l - l**-2)}\n" for s, mu in (("a", 3), ("b", 5)) for l in (1, 1.1, 1.2, 1.3, 1.4)]
+    (tmp_path / "lab.csv").write_text("specimen,stretch,stress\n" + "".join(rows))
+    (tmp_path / "lab.toml").write_text(
+        'file = "lab.csv"\nsample = "{specimen}"\nrecording = "pull"\nexperiment = "uniaxial"\n[columns]\n'
+        'stretch = { column = "stretch" }\nnominal_stress = { column = "stress", unit = "kPa" }\n'
+    )
+    (tmp_path / "lab.yaml").write_text(
+        "format: tissuejax-problem-1\nspecimen: lab.toml\nmodel: {energy: mooney-rivlin}\n"
+        "parameters: {energy.C01: {fixed: 0}, energy.C10: {bounds: [100 Pa, null]}}\n"
+        "options: {multistart: 1}\nout: out/lab\n"
+    )
+    assert main(["campaign", "run", "lab.yaml"]) == 0
+    capsys.readouterr()
+    assert main(["campaign", "status", "lab.yaml", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["done"] == 2
+    rows = {r["sample"]: r for r in table(tmp_path / "out/lab/campaign")}
+    assert rows["a"]["energy.C10"] == pytest.approx(1500, rel=1e-5)
+    assert rows["b"]["energy.C10"] == pytest.approx(2500, rel=1e-5)
+    assert "energy.C01" not in rows["a"]
+    settings = Store(tmp_path / "out/lab/campaign").planned()[0][0].settings
+    assert dict(settings.fit)["bounds"] == (("energy.C10", 100.0, "inf"),)
+    assert main(["campaign", "run", "c", "lab.toml", "--energy", "gent", "--fix", "energy.C01=0"]) == 2
+
+
+def sleeping(folder, task):
+    """A case that answers, dies, or does not listen to its alarm."""
+    if task["sample"] == "dead":
+        os.kill(os.getpid(), signal.SIGKILL)
+    time.sleep(60 if task["sample"] == "deaf" else 0)
+    return {"sample": task["sample"]}
+
+
+def test_a_case_that_does_not_stop_is_killed_and_the_next_one_runs():
+    child = Child(sleeping)
+    try:
+        assert child.answer("", {"sample": "a"}, 30, 0) == {"sample": "a"}
+        first = child.process.pid
+        assert child.answer("", {"sample": "deaf"}, 0.05, 0.05) is None
+        assert child.answer("", {"sample": "dead"}, 30, 0) is None
+        assert child.answer("", {"sample": "b"}, 30, 0) == {"sample": "b"}
+        assert child.process.pid != first
+    finally:
+        child.end()
+
+
+@pytest.mark.slow
+def test_the_limit_holds_under_dask(tmp_path):
+    pytest.importorskip("distributed")
+    begin(tmp_path / "c", cohort(tmp_path, 2, bad=False), SETTINGS, limit=0.001)
+    told = go_on(tmp_path / "c", "dask", 1)
+    assert told["failed"] == 2
+    assert set(told["failures"].values()) == {"took longer than 0.001 s"}
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_dies_loses_nothing_that_was_finished(tmp_path):
+    pytest.importorskip("distributed")
+    begin(tmp_path / "c", cohort(tmp_path, 40, bad=False), SETTINGS, retries=2)
+    where = tmp_path / "scheduler.json"
+    run = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard"]
+    scheduler = subprocess.Popen([*run, "--scheduler-file", str(where)], start_new_session=True)
+    run = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    worker = subprocess.Popen([*run, "--scheduler-file", str(where), "--death-timeout", "20"], start_new_session=True)
+    try:
+        while not where.exists() or not where.read_text().strip().endswith("}"):
+            time.sleep(0.2)
+        address = json.loads(where.read_text())["address"]
+        script = (
+            "from tissuejax.cli import main\nimport sys\nif __name__ == '__main__':\n"
+            f"    sys.exit(main(['campaign', 'resume', {str(tmp_path / 'c')!r}, '--engine', 'dask', '--scheduler', "
+            f"{address!r}]))\n"
+        )
+        (tmp_path / "go.py").write_text(script)
+        client = subprocess.Popen([sys.executable, str(tmp_path / "go.py")], stderr=subprocess.PIPE, text=True)
+        results, begun = tmp_path / "c" / "results", time.monotonic()
+        while len(list(results.rglob("*.json"))) < 3:
+            assert time.monotonic() - begun < 300
+            time.sleep(0.05)
+        scheduler.kill()
+        _, said = client.communicate(timeout=300)
+        assert client.returncode == 3
+        assert "campaign resume" in said
+    finally:
+        for process in (scheduler, worker):
+            process.kill()
+            process.wait()
+    there = status(tmp_path / "c")["done"]
+    assert there >= 3
+    assert len(list((tmp_path / "c" / "running").iterdir())) <= 1
+    told = go_on(tmp_path / "c")
+    assert told["ran"] == 40 - there
+    assert told["done"] == 40
 
 
 @pytest.mark.slow

@@ -3,18 +3,20 @@
 Workers need the same files under the same paths and the campaign's folder, as on a cluster's common file system.
 """
 
+from concurrent.futures import CancelledError
+from contextlib import suppress
 from typing import ClassVar
 
 from tissuejax.campaign.engine import Engine, Told, work
 from tissuejax.campaign.store import Store
 from tissuejax.campaign.task import Task
-from tissuejax.errors import InputError
+from tissuejax.errors import InputError, NotConverged
 
 DEATHS = 2  # times a case may take its worker with it before Dask gives it up
 
 
 class Dask(Engine):
-    """Worker processes of one thread each, since a limit in seconds needs the main thread's signal or none."""
+    """Worker processes of one thread each; a limit in seconds is kept by a child of the worker (`child`)."""
 
     name: ClassVar[str] = "dask"
 
@@ -27,6 +29,7 @@ class Dask(Engine):
         try:
             import dask
             from distributed import Client, KilledWorker, LocalCluster, as_completed
+            from distributed.comm import CommClosedError
         except ImportError as error:
             raise InputError("engine dask needs the extra `cluster`: pip install 'tissuejax[cluster]'") from error
         dask.config.set({"distributed.scheduler.allowed-failures": DEATHS, "distributed.worker.daemon": False})
@@ -45,7 +48,13 @@ class Dask(Engine):
                     told(future.result())
                 except KilledWorker:
                     continue  # left missing; the store counted how often it was begun
+        except (CommClosedError, CancelledError) as error:
+            raise NotConverged(
+                f"the Dask scheduler{f' at {where}' if where else ''} is gone ({error}); what was finished is kept: "
+                "start it again and go on with `tissuejax campaign resume`"
+            ) from error
         finally:
-            client.close()
+            with suppress(TimeoutError, OSError, CommClosedError):
+                client.close(timeout=5)
             if cluster is not None:
                 cluster.close()

@@ -1,10 +1,12 @@
 """What an engine is: it works through tasks, wherever; the store has the answers."""
 
 import abc
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
 
+from tissuejax.campaign.child import Child
 from tissuejax.campaign.store import Store
 from tissuejax.campaign.task import Task
 
@@ -31,5 +33,15 @@ class Engine(abc.ABC):
 
 
 def work(folder: str, task: dict[str, Any]) -> dict[str, Any]:
-    """Answer one task given as plain data; what engines send to their workers."""
-    return Store(Path(folder)).work(Task.of(task))
+    """Answer one task given as plain data; what engines send to their workers.
+
+    Where a limit can't ring, since this is not the process's main thread, a child answers (`child`).
+    """
+    asked, store = Task.of(task), Store(Path(folder))
+    if asked.limit <= 0 or threading.current_thread() is threading.main_thread():
+        return store.work(asked)
+    told = CHILD.answer(folder, task, asked.limit)
+    return store.fail(asked, f"took longer than {asked.limit:g} s and did not stop") if told is None else told
+
+
+CHILD = Child(work)

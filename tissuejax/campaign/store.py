@@ -60,8 +60,7 @@ class Store:
             if row is not None and not (failed and row["status"] == "failed"):
                 continue
             if row is None and self.begun(task.key) > retries:
-                reason = f"its worker died {self.begun(task.key)} times (killed, or out of memory)"
-                self._keep(task, {"sample": task.sample, "file": task.file, "status": "failed", "reason": reason})
+                self.fail(task, f"its worker died {self.begun(task.key)} times (killed, or out of memory)")
                 continue
             found.append(task)
         return found
@@ -80,7 +79,14 @@ class Store:
         row = answer(task)
         self._keep(task, row)
         mark.unlink(missing_ok=True)
-        return {name: row.get(name) for name in ("sample", "status", "reason", "seconds")}
+        return _brief(row)
+
+    def fail(self, task: Task, reason: str) -> dict[str, Any]:
+        """Keep a failure for a task whose process had to be ended."""
+        row = {"sample": task.sample, "file": task.file, "status": "failed", "reason": reason}
+        self._keep(task, row)
+        (self.folder / "running" / task.key).unlink(missing_ok=True)
+        return _brief(row)
 
     def rows(self, tasks: list[Task]) -> Iterator[tuple[Task, dict[str, Any] | None]]:
         """Every task with its row."""
@@ -89,3 +95,7 @@ class Store:
 
     def _keep(self, task: Task, row: dict[str, Any]) -> None:
         write_json(self.path(task.key), row)
+
+
+def _brief(row: dict[str, Any]) -> dict[str, Any]:
+    return {name: row.get(name) for name in ("sample", "status", "reason", "seconds")}

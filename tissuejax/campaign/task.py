@@ -17,6 +17,7 @@ from tissuejax.recordings.files import read, read_all
 from tissuejax.recordings.recording import Sample
 
 KINDS = ("fit", "diagnose")
+BY_PATH = ("fix", "start", "bounds", "priors")
 UNSTORED = ("seconds", "versions", "trace")  # of a fit's record: not part of the answer, or too long for a cohort
 
 
@@ -29,6 +30,9 @@ class Settings:
         energy, ogden_form, volumetric, effects: the model; for a diagnosis the effects to try (none: all).
         holdout: recordings to hold out, where a sample has them.
         multistart, seed: of a fit.
+        fit: further options of a fit as (name, value) pairs: only, free, fix, start, bounds, priors, weights, channels,
+            loss, stable, max_steps, method; those by path are pairs again, (path, number, ...), an
+            infinite number being "inf" (JSON has none).
     """
 
     kind: str
@@ -39,6 +43,7 @@ class Settings:
     holdout: tuple[str, ...] = ()
     multistart: int = 2
     seed: int = 0
+    fit: tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self):
         if self.kind not in KINDS:
@@ -62,9 +67,13 @@ class Task:
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> "Task":
         """From plain data."""
-        said = dict(data["settings"])
-        said["effects"], said["holdout"] = tuple(said["effects"]), tuple(said["holdout"])
+        said = {name: _frozen(value) for name, value in data["settings"].items()}
         return cls(data["key"], data["file"], data["sample"], Settings(**said), data["limit"])
+
+
+def _frozen(value: Any) -> Any:
+    """Lists as tuples, all the way down: what JSON makes of a tuple."""
+    return tuple(_frozen(v) for v in value) if isinstance(value, list | tuple) else value
 
 
 def tasks(files: list[str], settings: Settings, limit: float) -> list[Task]:
@@ -134,8 +143,17 @@ def _solved(task: Task) -> dict[str, Any]:
 
     bulk = catalogue.volumetric(s.volumetric) if s.volumetric else None
     model = Model(catalogue.energy(s.energy, s.ogden_form), bulk, tuple(effect(name) for name in s.effects))
-    fitted, held = split(sample, (), held)
-    found = fit(problem(predictor(model, sample, fitted)), multistart=s.multistart, holdout=held, seed=s.seed)
+    asked = dict(s.fit)
+    descent = {k: asked.pop(k) for k in ("max_steps", "method") if k in asked}
+    posing = {
+        k: {path: float(of[0]) if len(of) == 1 else tuple(map(float, of)) for path, *of in asked.pop(k)}
+        for k in BY_PATH
+        if k in asked
+    }
+    fitted, held = split(sample, tuple(n for n in asked.pop("only", ()) if n in sample.recordings), held)
+    posed = problem(predictor(model, sample, fitted), **posing, **asked)
+    start = dict(posed.start) if "start" in posing else None
+    found = fit(posed, start=start, multistart=s.multistart, holdout=held, seed=s.seed, **descent)
     return {name: value for name, value in found.record().items() if name not in UNSTORED}
 
 

@@ -3,21 +3,25 @@
 import argparse
 import csv
 import io
+import math
 import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import ClassVar
 
+from tissuejax import verbs
 from tissuejax.campaign.run import begin, engines, go_on, status, table
 from tissuejax.campaign.store import PLAN, Store
 from tissuejax.campaign.task import Settings
-from tissuejax.commands.arguments import add_model, positive
+from tissuejax.commands.arguments import add_fit, add_model, fit_options, positive
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.outputs import WITH_A_PAGE
 from tissuejax.errors import InputError
 from tissuejax.progress import for_terminal
+from tissuejax.recordings.files import read_all
 from tissuejax.storage import write_text
 
+PLAIN = {"weights": "auto", "loss": "squares", "method": "levenberg-marquardt", "max_steps": 200}
 ACTIONS = ("run", "resume", "status", "report", "population")
 
 
@@ -33,6 +37,7 @@ recordings, the settings and the code: what is there is not done again, a killed
 
   tissuejax campaign run out/ecoflex fits/ecoflex/ecoflex-each.toml --energy reduced-polynomial-2 --engine processes
   tissuejax campaign run out/beef day1.toml day2.toml --kind diagnose --energy neo-hookean --limit 600
+  tissuejax campaign run cohort.yaml                              a problem file; FOLDER is then out/.../campaign
   tissuejax campaign status out/ecoflex
   tissuejax campaign resume out/ecoflex --engine dask --scheduler tcp://login:8786      --failed does failures again
   tissuejax campaign report out/ecoflex                                                 cases.csv and a page
@@ -52,10 +57,8 @@ Engines: serial, processes, dask (extra `cluster`). docs/cohort.md shows Slurm.
         parser.add_argument("files", nargs="*", metavar="FILE", help="for run: recording files or side files")
         parser.add_argument("--kind", default="fit", choices=["fit", "diagnose"], help="what is asked (default fit)")
         add_model(parser, required=False)
-        parser.add_argument(
-            "--holdout", action="append", default=[], metavar="RECORDING", help="hold it out where there"
-        )
-        parser.add_argument("--multistart", type=int, default=2, metavar="N", help="starts of a fit (default 2)")
+        add_fit(parser)
+        parser.set_defaults(multistart=2)
         parser.add_argument("--engine", default="serial", metavar="NAME", help=f"{', '.join(sorted(engines()))}")
         parser.add_argument("--workers", type=int, default=2, metavar="N", help="at once (default 2)")
         parser.add_argument("--scheduler", metavar="ADDRESS", help="of Dask, e.g. tcp://login:8786")
@@ -77,10 +80,7 @@ Engines: serial, processes, dask (extra `cluster`). docs/cohort.md shows Slurm.
                 raise InputError("campaign run needs FILEs and --energy")
             if given.limit < 0 or given.retries < 0:
                 raise InputError("--limit and --retries are 0 or more")
-            settings = Settings(
-                given.kind, given.energy, given.ogden_form, given.volumetric, tuple(given.effect), tuple(given.holdout),
-                positive(given.multistart, "--multistart"),
-            )  # fmt: skip
+            settings = _settings(given)
             if not given.force:
                 _refuse_another(given.folder, settings)
             begin(given.folder, given.files, settings, given.limit, given.retries)
@@ -95,6 +95,28 @@ Engines: serial, processes, dask (extra `cluster`). docs/cohort.md shows Slurm.
             told = status(given.folder)
             return Reply(told, _text(told))
         return _report(given.folder)
+
+
+def _settings(given: argparse.Namespace) -> Settings:
+    """What is asked of every sample; paths are checked on the first."""
+    first = next(iter(read_all(given.files[0]).values()))
+    model = verbs.material(
+        given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
+    ).across(tuple(first.recordings))
+    options = fit_options(given, model.parameters)
+    common = {name: options.pop(name) for name in ("holdout", "multistart", "seed")}
+    pairs = []
+    for name, value in options.items():
+        if value == PLAIN.get(name) or value in (None, [], {}, False):
+            continue
+        if isinstance(value, dict):
+            of = {path: v if isinstance(v, tuple) else (v,) for path, v in value.items()}
+            value = tuple((path, *(x if math.isfinite(x) else str(x) for x in v)) for path, v in of.items())
+        pairs.append((name, tuple(value) if isinstance(value, list) else value))
+    return Settings(
+        given.kind, given.energy, given.ogden_form, given.volumetric, tuple(given.effect), tuple(common["holdout"]),
+        common["multistart"], common["seed"], tuple(pairs) if given.kind == "fit" else (),
+    )  # fmt: skip
 
 
 def _refuse_another(folder: Path, settings: Settings) -> None:

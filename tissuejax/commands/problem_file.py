@@ -3,6 +3,7 @@
     tissuejax fit liver.yaml
     tissuejax diagnose liver.yaml
     tissuejax compare liver.yaml --multistart 2       # what is typed beside it is added, and wins
+    tissuejax campaign run cohort.yaml                # every sample of the file; status, resume and report likewise
 
 `problem.schema.json` beside this file is the schema (docs/problem-file.md shows an example). A verb takes what concerns
 it: the file becomes the arguments that one would have typed, so that every check and every message is the command's.
@@ -16,7 +17,7 @@ from pathlib import Path
 from tissuejax.errors import InputError
 
 ENDINGS = (".yaml", ".yml")
-VERBS = ("fit", "diagnose", "compare")
+VERBS = ("fit", "diagnose", "compare", "campaign")
 # Options that a verb doesn't have are left out, since one file serves all of them.
 _OF_FITS = {"weights", "loss", "method", "multistart", "max-steps", "seed", "stable", "channel"}
 
@@ -58,12 +59,26 @@ def expanded(argv: Sequence[str]) -> list[str]:
     """
     argv = list(argv)
     words = [k for k, word in enumerate(argv) if not word.startswith("-")]
-    if len(words) < 2 or argv[words[0]] not in VERBS or not argv[words[1]].lower().endswith(ENDINGS):
+    named = 2 if words and argv[words[0]] == "campaign" else 1  # the action stands before the file
+    if len(words) <= named or argv[words[0]] not in VERBS or not argv[words[named]].lower().endswith(ENDINGS):
         return argv
-    path = Path(argv[words[1]])
-    made = arguments(argv[words[0]], read_problem(path), path)
-    typed = [*argv[words[0] + 1 : words[1]], *argv[words[1] + 1 :]]
-    return [*argv[: words[0] + 1], *made, *typed]
+    path = Path(argv[words[named]])
+    problem = read_problem(path)
+    typed = [*argv[words[0] + 1 : words[named]], *argv[words[named] + 1 :]]
+    if named == 2:
+        action = argv[words[1]]
+        typed.remove(action)
+        return [*argv[: words[0] + 1], action, *campaign_arguments(action, problem, path, typed), *typed]
+    return [*argv[: words[0] + 1], *arguments(argv[words[0]], problem, path), *typed]
+
+
+def campaign_arguments(action: str, problem: Mapping[str, object], path: Path, typed: Sequence[str] = ()) -> list[str]:
+    """What one would have typed after `campaign ACTION`: the folder, and for `run` what is asked of every sample."""
+    folder = str(Path(problem.get("out", Path("out") / path.stem)) / "campaign")
+    if action != "run":
+        return [folder]
+    plain = {key: value for key, value in problem.items() if key != "out"}
+    return [folder, *arguments("diagnose" if "diagnose" in typed else "fit", plain, path)]
 
 
 def arguments(verb: str, problem: Mapping[str, object], path: Path) -> list[str]:
