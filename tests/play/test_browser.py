@@ -4,6 +4,7 @@ import asyncio
 import shutil
 import threading
 
+import numpy as np
 import pytest
 
 from tests.surrogate import made
@@ -87,6 +88,36 @@ def test_alone_it_presses_relaxes_and_agrees_with_python(browser, model, tmp_pat
         assert theirs == pytest.approx(list(ours), abs=2e-6)
     shot = tab.screenshot()
     assert len(set(shot)) > 100
+    assert not faults
+
+
+def test_residuals_of_markers_colour_the_surface_between_them(browser, tmp_path):
+    found = made.small()
+    middle = np.append(np.asarray(found.surrogate.low + found.surrogate.high) / 2, 0.018)
+    rest = middle + 1e-3 * np.array([[-2, 0, 0], [0, 0, 0], [2, 0, 0], [0, 2.5, 0]])
+    measured = np.tile(rest, (2, 1, 1))
+    measured[:, 3] = np.nan  # hidden from the cameras all the time
+    predicted = measured + 1e-4 * np.arange(4)[None, :, None] * np.array([0, 0, 1])
+    replay = {
+        "name": "r1", "duration": 1.0, "frames": 2, "text": "", "points": 4,
+        "time": blob.coded([0, 1]), "path": blob.coded(np.tile(middle + [0, 0, 2e-3], (2, 1))),
+        "measured": blob.coded(np.zeros((2, 3))), "predicted": blob.coded(np.zeros((2, 3))),
+        "markers": blob.coded(measured), "simulated": blob.coded(predicted),
+    }  # fmt: skip
+    url = page.export(blob.of_surrogate(found, ["measured"], replay), tmp_path / "page.html").as_uri()
+    tab, faults = opened(browser, url)
+    tab.select_option("#map", "3")
+    assert tab.evaluate("replay.most") == pytest.approx(2e-4, rel=1e-4)
+    plan = [float(x) for x in [*rest[0, :2], *rest[2, :2], *((rest[0] + rest[1]) / 2)[:2], 1.0, 1.0]]
+    got = tab.evaluate(
+        f"(() => {{ const v = new Float32Array(4); residualAt({plan}, v);"
+        " return Array.from(v, x => x * replay.most); })()"
+    )
+    assert got[0] == pytest.approx(0, abs=1e-5)
+    assert got[1] == pytest.approx(2e-4, abs=1e-5)
+    assert 3e-5 < got[2] < 1e-4
+    assert got[3] < 0  # no marker near
+    tab.wait_for_function("document.getElementById('range').textContent.includes('0.20 mm')", timeout=60_000)
     assert not faults
 
 

@@ -28,7 +28,7 @@ def test_a_held_press_tends_to_static_equilibrium_and_rest_forgets():
 
 
 def test_slow_motion_is_refused_with_a_mesh_that_would_do():
-    slow = Pace(0.8, 1.2, 2.0, 0.1, 576, 0.25)
+    slow = Pace(0.8, 1.2, 2.0, 576, 0.25)
     with pytest.raises(InputError, match=r"0.80 times life.*--mesh 10x10x3"):
         keeps_up(slow, Grid((12, 12, 4), 4e-3))
     assert largest(slow, Grid((12, 12, 4), 4e-3)).counts == (10, 10, 3)

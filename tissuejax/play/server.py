@@ -7,6 +7,7 @@ no other up. What a page sends is checked and otherwise passed over.
 import asyncio
 import contextlib
 import json
+import os
 import time
 from http import HTTPStatus
 
@@ -56,7 +57,7 @@ class Server:
                 ticking.cancel()
         except OSError as fault:
             raise InputError(
-                f"port {self.port} can't be opened ({fault.strerror}); another program holds it: give another --port"
+                f"port {self.port} can't be opened ({os.strerror(fault.errno or 0)}): give another --port"
             ) from fault
 
     def _http(self, connection: ServerConnection, request) -> Response | None:
