@@ -160,16 +160,19 @@ def fit(
 
 
 def diagnose(
-    data: str | os.PathLike | Sample, energy: str, *, holdout: str | Sequence[str] | None = None, **options
+    data: str | os.PathLike | Sample,
+    energy: str | Energy | Model,
+    *,
+    holdout: str | Sequence[str] | None = None,
+    **options,
 ) -> "Diagnosis":
     """What the model of a sample lacks: where it misses, which effect, how sure; see `diagnosis.diagnose.diagnose`.
 
     Args:
         data: a recording file or a Sample.
-        energy: base model, by name.
-        holdout: recordings to predict from a fit to the others; the last one by default. Of material tests they have a
-            say in which set of effects is chosen.
-        options: `effects` to try, `ogden_form`, `progress`, `budget`.
+        energy: base model: a strain energy by name or as an object, or a Model whose effects are known to act.
+        holdout: recordings to predict from a fit to the others; the last one by default. They too choose the set.
+        options: `effects` to try, `known` physics, `ogden_form`, `progress`, `effort`.
     """
     from tissuejax.diagnosis.diagnose import diagnose as run
 

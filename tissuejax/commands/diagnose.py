@@ -38,6 +38,7 @@ shown come from a fit to the others, with nothing fitted to those held out.
 
   tissuejax diagnose liver.h5 --energy reduced-polynomial-2 --out out/liver
   tissuejax diagnose muscle.toml --energy neo-hookean --holdout slow --holdout fast
+  tissuejax diagnose liver.h5 --energy reduced-polynomial-2 --with gravity --with viscoelasticity.g1=0.3
   tissuejax diagnose rubber.toml --energy ogden-3 --ogden-form mu/alpha --effect viscoelasticity --effect softening
 
 What is written into --out: result.json (every number), report.html (one page to read and keep), remainder.json (what is
@@ -57,6 +58,14 @@ tests and cuts begin anew.
         parser.add_argument(
             "--only", action="append", default=[], metavar="NAME", help="diagnose this recording (repeat for more)"
         )
+        parser.add_argument(
+            "--with",
+            dest="known",
+            action="append",
+            default=[],
+            metavar="EFFECT",
+            help="known physics: gravity, or viscoelasticity.g1=0.3; what is not given is fitted (repeat)",
+        )
         parser.add_argument("--effect", action="append", metavar="NAME", help="try only these effects (repeat)")
         add_out(parser, "out/SAMPLE-diagnosis-ENERGY")
 
@@ -72,6 +81,7 @@ tests and cuts begin anew.
             effects=given.effect,
             ogden_form=given.ogden_form,
             keep=out / "runs",
+            known=given.known,
         )
         return told(found, write_diagnosis(found, out))
 

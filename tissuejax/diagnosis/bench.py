@@ -114,6 +114,7 @@ class Bench(abc.ABC):
         start: neutral values of all paths.
         candidates: by key.
         warnings: sentences for the reader.
+        known: values of effects that the base model has already, by path; they are in every prediction.
         spent: cost of all predictions so far, in those of the plain base model (see `Effort.spend`).
     """
 
@@ -128,6 +129,7 @@ class Bench(abc.ABC):
     candidates: dict[str, Candidate]
     warnings: list[str] = field(default_factory=list)
     spent: float = 0.0
+    known: dict[str, float] = field(default_factory=dict)
 
     @abc.abstractmethod
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:

@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import jax
@@ -17,6 +17,7 @@ from tissuejax.diagnosis.judgement.blocks import blocks, series
 from tissuejax.diagnosis.judgement.evidence import write_evidence
 from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.judgement.judge import Kind
+from tissuejax.diagnosis.known import known_physics, label, tell
 from tissuejax.diagnosis.material import MaterialBench, modes
 from tissuejax.diagnosis.next_experiment import proposals, settling
 from tissuejax.diagnosis.next_probing import probing_proposals
@@ -32,6 +33,7 @@ from tissuejax.energies.energy import Energy
 from tissuejax.errors import InputError, unknown
 from tissuejax.estimation.discrepancy import discrepancy
 from tissuejax.experiments.catalogue import experiment
+from tissuejax.model import Model
 from tissuejax.progress import Progress, Silent
 from tissuejax.recordings.files import read
 from tissuejax.recordings.plausible import refuse_gaps, refuse_unusable, slips
@@ -56,7 +58,7 @@ PROBING = Effort(
 
 def diagnose(
     source: str | os.PathLike | Sample,
-    energy: str = "reduced-polynomial-2",
+    energy: str | Energy | Model = "reduced-polynomial-2",
     holdout: str | Sequence[str] | None = None,
     out: str | os.PathLike | None = None,
     progress: Progress | None = None,
@@ -64,21 +66,24 @@ def diagnose(
     ogden_form: str | None = None,
     effort: Effort | None = None,
     keep: Path | None = None,
+    known: Sequence[str] | Mapping[str, float] = (),
 ) -> Diagnosis:
     """What is missing in the model of a sample: the verdict, with everything it rests on.
 
     Args:
         source: a recording file or a sample.
-        energy: base model, by its name on the command line.
+        energy: base model: a strain energy by name or as an object, or a model with effects that are known to act.
         holdout: recordings to predict; the last one by default, none if there is only one. All parameters and errors
             shown come from a fit to the other recordings. Of material tests all recordings, these too, choose the set
-            of effects; of probings and cuts only what is a recording's own (an offset, a phase) is fitted to these.
+            of effects.
         out: folder for `result.json` and the unexplained remainder; nothing is written by default.
         effects: names of the effects to try; all that can act by default.
         ogden_form: for `ogden-N`.
         effort: how much is tried and may be spent.
         keep: folder in which a stopped diagnosis of probings finds its finished simulations again (removed at the end);
             inside `out` by default. Other diagnoses begin anew.
+        known: effects that are known to act, "gravity", "viscoelasticity.g1=0.3", or values by dotted path
+            (`Diagnosis.repaired`); what is given is kept, the rest of such an effect is fitted with the base.
 
     Raises:
         InputError: a file that can't be read, an unknown recording or effect, fewer samples than parameters.
@@ -92,26 +97,37 @@ def diagnose(
     refuse_unusable(sample, (*fitted, *held_out))
     refuse_gaps(sample, (*fitted, *held_out))
     for name in effects or ():
-        known = (*all_effects(), SCATTER.name, HYSTERESIS.name)
-        if name not in known:
-            raise unknown("effect", name, known)
+        offers = (*all_effects(), SCATTER.name, HYSTERESIS.name)
+        if name not in offers:
+            raise unknown("effect", name, offers)
     remarks += slips(sample, (*fitted, *held_out))
-    base = named_energy(energy, ogden_form)
     kind = experiment(sample.recordings[fitted[0]].experiment).kind
+    told_effects = [*([e.name for e in energy.effects] if isinstance(energy, Model) else ()), *_items(known)]
+    base = energy.energy if isinstance(energy, Model) else energy
+    base = base if isinstance(base, Energy) else named_energy(base, ogden_form)
+    physics = known_physics(told_effects, kind)
+    energy = label(energy if isinstance(energy, str) else base.name, physics)
+    tried = None if effects is None else (*effects, *physics)
     keep = keep or (None if out is None else Path(out) / "runs")
     every = (*fitted, *held_out)
     if kind == "probing":
-        own = ProbingBench.of(sample, base, every, (), effects, keep)
-        whole, bench = ProbingView.of(own), ProbingView.of(own.narrowed(fitted, held_out, effects))
+        own = ProbingBench.of(sample, base, every, (), tried, keep)
+        narrow = own.narrowed(fitted, held_out, tried)
+        for b in (own, narrow):
+            tell(b, physics)
+        whole, bench = ProbingView.of(own), ProbingView.of(narrow)
         effort = effort or PROBING
     elif kind == "cutting":
-        bench, whole = (CuttingBench.of(sample, base, f, h, effects) for f, h in ((fitted, held_out), (every, ())))
+        bench, whole = (CuttingBench.of(sample, base, f, h, tried) for f, h in ((fitted, held_out), (every, ())))
+        for b in (bench, whole):
+            tell(b, physics)
     else:
         sigma, more = sigmas(sample, every)
         bench, whole = (
-            MaterialBench.of(sample, base, f, h, sigma, effects) for f, h in ((fitted, held_out), (every, ()))
+            MaterialBench.of(sample, base, f, h, sigma, tried) for f, h in ((fitted, held_out), (every, ()))
         )
         for b in (bench, whole):
+            tell(b, physics)
             b.candidates, left_out = offered(sample, b.candidates, effects)
         remarks += more + left_out
     bench.warnings += remarks
@@ -174,6 +190,10 @@ def _material(sample: Sample, energy: str, base: Energy, found: Answered) -> Dia
         open_ends = foreseen(found.bench, found.whitenings[keys], found.plain[keys])
         found.bench.warnings += [x.sentence(found.chosen) for x in open_ends if x.over_noise > OPEN]
     return Diagnosis(sample.name, energy, found, 0.0, ideas, [], open_ends)
+
+
+def _items(known: Sequence[str] | Mapping[str, float]) -> list[str]:
+    return [f"{k}={v!r}" for k, v in known.items()] if isinstance(known, Mapping) else list(known)
 
 
 def split(sample: Sample, holdout: str | Sequence[str] | None) -> tuple[tuple[str, ...], tuple[str, ...], list[str]]:

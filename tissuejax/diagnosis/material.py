@@ -247,6 +247,7 @@ class MaterialBench(Bench):
 
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:
         """See `Bench.predict`."""
+        values = {**self.known, **values}
         program = self._program(values)
         out = self.y.copy()
         for name in recordings or self._tests:
@@ -318,7 +319,7 @@ class MaterialBench(Bench):
         self, values: Mapping[str, float], paths: Sequence[str], recordings: Sequence[str] | None = None
     ) -> Float[np.ndarray, "N k"]:
         """See `Bench.jacobian`."""
-        at = {**{p: self.start[p] for p in paths}, **values}
+        at = {**{p: self.start[p] for p in paths}, **self.known, **values}
         steps = np.array([self._step(p, at[p]) for p in paths])
         pairs = []
         for p, h in zip(paths, steps):
@@ -330,7 +331,7 @@ class MaterialBench(Bench):
         self, values: Mapping[str, float], settings: Sequence[tuple[Mapping[str, float], str]]
     ) -> Float[np.ndarray, "N k"]:
         """See `Bench.columns`. While an effect is neutral its shapes mean nothing: all start from one prediction."""
-        pairs, steps = [], []
+        pairs, steps, values = [], [], {**self.known, **values}
         for setting, path in settings:
             known = {k: v for k, v in values.items() if k.startswith(ADDED)} if path.startswith(ADDED) else values
             at = {path: self.start[path], **known, **setting}

@@ -26,6 +26,7 @@ from tissuejax.diagnosis.periodogram import lines
 from tissuejax.diagnosis.probing_catalogue import places, probing_entries
 from tissuejax.diagnosis.probing_runs import COARSE, FINE, ROUGH, Runs
 from tissuejax.diagnosis.probing_series import kept_samples, series
+from tissuejax.effects.catalogue import effects
 from tissuejax.energies.catalogue import volumetric
 from tissuejax.energies.energy import Energy
 from tissuejax.experiments.predictor import predictor
@@ -87,7 +88,7 @@ class ProbingBench(Bench):
         """The same probings and runs with other recordings fitted; `names`: effects to try."""
         made = copy.copy(self)
         made.fitted, made.held_out, made.warnings = fitted, held_out, list(self.warnings)
-        made.free, made.start, made.candidates = {}, {}, {}
+        made.free, made.start, made.candidates, made.known = {}, {}, {}, {}
         made._declare(names)
         return made
 
@@ -101,7 +102,8 @@ class ProbingBench(Bench):
         self.base = tuple(self.free)
         guess = self.model.energy.initial_shear_modulus({p.split(".")[1]: v for p, v in self.start.items()})
         every = {e.effect.name: e.effect for e in probing_entries(1.0)}
-        self.runs.effects = every
+        lone = {n: e() for n, e in effects("probing").items() if n not in every}  # only ever told
+        self.runs.effects = every | lone
         ratio = self._scale()
         for path in self.base:
             self.start[path] *= ratio if self.free[path].unit == "Pa" else 1.0
@@ -136,7 +138,7 @@ class ProbingBench(Bench):
 
     def at(self, values: Mapping[str, float]) -> dict[str, float]:
         """`values` with the base's own where they say nothing."""
-        return {p: self.start[p] for p in self.base} | dict(values)
+        return {p: self.start[p] for p in self.base} | self.known | dict(values)
 
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:
         """See `Bench.predict`; NaN where a simulation broke down."""

@@ -52,6 +52,13 @@ class Diagnosis:
         """The answer."""
         return self.answered
 
+    @property
+    def repaired(self) -> dict[str, float]:
+        """Values of the effects named, by path: `diagnose(sample, energy, known=found.repaired)` asks what else."""
+        names = {f"effects.{n}." for n in self.answered.judgement.names}
+        values = self.answered.chosen.values
+        return {p: v for p, v in values.items() if p.startswith(tuple(names))} if names else {}
+
     def located(self) -> list[Located]:
         """Where the base model misses: in time, drive, channel, and in space where maps were made."""
         a = self.answered

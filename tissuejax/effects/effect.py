@@ -46,6 +46,7 @@ class Effect(eqx.Module):
             what moves the probe needs no run of its own (`diagnosis.probing_free`).
         misjudged: by parameter, how far a careful experimenter misjudges it, standard deviation in its unit: the prior
             of an effect that only corrects what was noted.
+        standard: values that are meant where the effect is told without any (weight: 9.81 m/s^2).
         candidate: False if its size is known beforehand (weight): nothing to be found, but something to be told.
 
     Hooks, in the order in which a material test applies them; each is the identity unless overridden:
@@ -69,6 +70,7 @@ class Effect(eqx.Module):
     isotropic: ClassVar[bool] = True
     remembers: ClassVar[bool] = True
     misjudged: ClassVar[Mapping[str, float]] = {}
+    standard: ClassVar[Mapping[str, float]] = {}
     candidate: ClassVar[bool] = True
 
     @property

@@ -26,6 +26,7 @@ class Gravity(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
     remembers: ClassVar[bool] = False
     candidate: ClassVar[bool] = False
+    standard: ClassVar[Mapping[str, float]] = {"acceleration": 9.81}
     reveals: ClassVar[str] = "tissue that seems stiffer towards the support and softer at its free sides"
     blind: ClassVar[str] = "samples whose sag is small against the depth; material tests"
     words: ClassVar[tuple[str, ...]] = ("it weighs with {acceleration}",)
