@@ -11,7 +11,7 @@ from tissuejax.diagnosis import probing_free
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_runs import COARSE, FINE
-from tissuejax.diagnosis.probing_view import REMAINS, ProbingView, probing_blocks, probing_discrepancy
+from tissuejax.diagnosis.probing_view import REMAINS, ProbingView
 from tissuejax.diagnosis.refit import refit
 from tissuejax.energies.catalogue import energy
 from tissuejax.recordings.recording import Sample
@@ -142,23 +142,6 @@ def test_what_is_open_is_a_column_for_every_channel_of_every_recording(bench):
     assert (np.count_nonzero(columns, axis=1) <= 1).all()
     fine, coarse = (bench.runs.many([(bench.at(VALUES), bench.fitted, k)])[0] for k in (FINE, COARSE))
     np.testing.assert_allclose(columns.sum(axis=1) * near.unit, REMAINS * (fine - coarse), rtol=1e-6, atol=1e-12)
-
-
-def test_the_discrepancy_of_probings_is_a_covariance_of_every_family(bench):
-    view = ProbingView.of(bench)
-    cut = probing_blocks(view)
-    parts = probing_discrepancy(view, cut).about(cut.mean(view.y))
-    assert {p.family for p in parts} == {"law", "gain", "hysteresis", "slow", "marker", "white"}
-    for part in parts:
-        if part.factor is not None:
-            assert part.factor.shape[0] == len(cut.starts)
-            assert np.isfinite(part.factor).all()
-        else:
-            assert sum(len(b) for b in part.within) == len(cut.starts)
-            assert all(np.linalg.eigvalsh(b).min() > -1e-9 for b in part.within)
-    markers = next(p for p in parts if p.name == "marker")
-    for s, block in zip(view.segments, markers.within, strict=True):
-        assert (s.channel == "markers") == bool(np.any(block))
 
 
 def test_a_stopped_diagnosis_finds_its_runs_again(pressed_too_deep, tmp_path, monkeypatch):

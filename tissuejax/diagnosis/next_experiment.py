@@ -150,6 +150,7 @@ def proposals(
     trial = MaterialBench.of(
         made, energy, tuple(made.recordings), (), dict.fromkeys(made.recordings, sigma), sizes=bench.sizes
     )
+    trial.known = bench.known
     names = [", ".join(dict.fromkeys(bench.candidates[k].name for k in r.keys)) for r in (chosen, rival)]
     told = [trial.predict(shared(r)) for r in (chosen, rival)]
     old = [bench.jacobian(r.values, tuple(r.values), bench.fitted)[bench.mask(bench.fitted)] for r in (chosen, rival)]

@@ -16,6 +16,7 @@ Richardson 1911, Phil. Trans. R. Soc. A 210.
 
 import copy
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -24,16 +25,7 @@ from tissuejax.diagnosis.bench import Bench, Candidate
 from tissuejax.diagnosis.judgement.blocks import Blocks, blocks
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_runs import COARSE, FINE
-from tissuejax.estimation.discrepancy import (
-    ALIKE,
-    LAW,
-    SLOW,
-    STATES,
-    Discrepancy,
-    Part,
-    loading_states,
-    smooth_factor,
-)
+from tissuejax.estimation.discrepancy import ALIKE, LAW, SLOW, STATES, Part, loading_states, smooth_factor
 
 BLOCKS = {"force": 80, "markers": 16}  # block means of a series: markers are many and calm
 REMAINS = 1.2  # mesh 12 to 16 elements: 1 / (16^2 / 12^2 - 1) = 1.29; step halved: 1
@@ -146,65 +138,97 @@ def probing_blocks(view: ProbingView) -> Blocks:
     return blocks(view, BLOCKS)
 
 
-def probing_discrepancy(view: ProbingView, cut: Blocks) -> Discrepancy:
-    """What any model leaves of probings; the families are those of material tests, and one of each marker's own.
+@dataclass(frozen=True)
+class ProbingDiscrepancy:
+    """What any model leaves of probings; forces and markers err apart, so each part has an amplitude of its own.
 
-    Law: smooth in depth times the prediction, common to all recordings. Gain, own law: of each recording's and
-    channel's own. Marker: smooth in depth times what the marker moved, of each component's own (a marker is not where
-    it was registered). Hysteresis and slow wander: in units of the channel's largest value.
+    Attributes:
+        shaped: name, family and factors about a prediction of one, of the parts that scale with what is predicted.
+        fixed: the parts that don't.
     """
-    segments, n = view.segments, len(cut.starts)
+
+    shaped: tuple[tuple[str, str, Float[np.ndarray, "M r"]], ...]
+    fixed: tuple[Part, ...]
+
+    def about(self, prediction: Float[np.ndarray, " M"]) -> tuple[Part, ...]:
+        """The parts beside this prediction; always in the same order."""
+        return (*(Part(name, family, prediction[:, None] * f) for name, family, f in self.shaped), *self.fixed)
+
+
+def probing_discrepancy(view: ProbingView, cut: Blocks) -> ProbingDiscrepancy:
+    """The discrepancy of probings, in the families of material tests and one of each marker's own.
+
+    Law: smooth in depth times the prediction, common to all recordings. Gain, own law: of each recording's own.
+    Hysteresis (of the force) and slow wander: in units of the channel's largest value. Marker: smooth in depth times
+    what the marker moved, of each component's own, since a marker is not quite where it was registered.
+    """
+    segments = view.segments
     rows = [np.flatnonzero(cut.owner == k) for k in range(len(segments))]
-    depth = cut.mean(_drive(view))
+    depth, time = cut.mean(_joined(view, "drive")), cut.mean(_joined(view, "time"))
+    span = float(np.ptp(depth)) or 1.0
     channel = np.array([segments[k].channel for k in cut.owner])
     recording = np.array([segments[k].recording for k in cut.owner])
-    channels = list(dict.fromkeys(channel.tolist()))
-    sets = [(channel == c) for c in channels]
-    each = [(recording == r) & (channel == c) for c in channels for r in dict.fromkeys(recording.tolist())]
-
     grid = np.linspace(depth.min(), depth.max(), 60)
 
-    def columns(groups: Sequence[np.ndarray], length: float) -> Float[np.ndarray, "M r"]:
+    def smooth_in_depth(length: float) -> Float[np.ndarray, "M r"]:
         known = smooth_factor(grid[:, None], length)
-        factor = np.stack([np.interp(depth, grid, f) for f in known.T], axis=1)
-        return np.concatenate([factor * inside[:, None] for inside in groups], axis=1)
+        return np.stack([np.interp(depth, grid, f) for f in known.T], axis=1)
 
-    states = np.zeros((n, len(STATES)))
-    moved, time = np.zeros(n), cut.mean(_times(view))
+    wide, fine, alike = (smooth_in_depth(length) for length in (LAW["law"], LAW["fine law"], ALIKE))
+    states = np.zeros((len(cut.starts), len(STATES)))
     for k, s in enumerate(segments):
-        one = Blocks(cut.starts[rows[k]] - s.rows.start, cut.counts[rows[k]], np.zeros(0, int))
-        states[rows[k]] = one.mean(loading_states(s.drive))
-        if s.channel == "markers":
-            moved[rows[k]] = one.mean(_travel(view, s))
-    near = columns(sets, ALIKE)
-    fixed = [Part(f"hysteresis, {shape}", "hysteresis", near * states[:, i, None]) for i, shape in enumerate(STATES)]
-    for name, share in SLOW.items():
-        within = []
-        for own in rows:
-            elapsed = time[own] / (float(np.ptp(time[own])) or 1.0)
-            within.append(np.exp(-np.abs(elapsed[:, None] - elapsed) / share))
-        fixed.append(Part(name, "slow", within=tuple(within)))
-    spans = float(np.ptp(depth)) or 1.0
-    alike = [np.exp(-0.5 * ((depth[o][:, None] - depth[o]) / spans / LAW["law"]) ** 2) for o in rows]
-    fixed.append(Part("marker", "marker", within=tuple(a * np.outer(moved[o], moved[o]) for a, o in zip(alike, rows))))
-    sigma = cut.spread(view.sigma)
-    scatter = [np.diag((sigma[o] / max(float(np.median(sigma[o])), 1e-300)) ** 2) for o in rows]
-    fixed.append(Part("white", "white", within=tuple(scatter)))
-    laws = tuple((name, columns(sets if name == "law" else sets[:1], length)) for name, length in LAW.items())
-    belongs = np.stack([e.astype(float) for e in each], axis=1)
-    return Discrepancy(laws, belongs, columns(each, LAW["law"]), tuple(fixed))
+        own = Blocks(cut.starts[rows[k]] - s.rows.start, cut.counts[rows[k]], np.zeros(0, int))
+        states[rows[k]] = own.mean(loading_states(s.drive))
+    shaped, fixed = [], []
+    for c in dict.fromkeys(channel.tolist()):
+        inside = (channel == c)[:, None]
+        of = "" if c == "force" else f" of {c}"
+        each = [inside * (recording == r)[:, None] for r in dict.fromkeys(recording.tolist())]
+        shaped.append((f"law{of}", "law", wide * inside))
+        shaped.append((f"gain{of}", "gain", np.concatenate(each, axis=1).astype(float)))
+        shaped.append((f"own law{of}", "gain", np.concatenate([wide * e for e in each], axis=1)))
+        if c == "force":
+            shaped.append(("fine law", "law", fine * inside))
+            for i, shape in enumerate(STATES):
+                fixed.append(Part(f"hysteresis, {shape}", "hysteresis", alike * inside * states[:, i, None]))
+        for name, share in SLOW.items():
+            if c == "force" or name == "lasting":
+                fixed.append(Part(f"{name}{of}", "slow", within=_within(rows, inside, _wander(time, share))))
+        sigma = cut.spread(view.sigma)
+        scatter = [np.diag((sigma[o] / max(float(np.median(sigma[o])), 1e-300)) ** 2) * inside[o[0]] for o in rows]
+        fixed.append(Part(f"white{of}", "white", within=tuple(scatter)))
+    if (channel == "markers").any():
+        travel = np.concatenate([_travel(view, s) for s in segments])
+        moved = cut.mean(travel)
+
+        def marker(o: np.ndarray) -> np.ndarray:
+            near = np.exp(-0.5 * ((depth[o][:, None] - depth[o]) / span / LAW["law"]) ** 2)
+            return near * np.outer(moved[o], moved[o])
+
+        fixed.append(Part("marker", "marker", within=_within(rows, (channel == "markers")[:, None], marker)))
+    return ProbingDiscrepancy(tuple(shaped), tuple(fixed))
 
 
-def _drive(view: ProbingView) -> Float[np.ndarray, " N"]:
-    return np.concatenate([s.drive for s in view.segments])
+def _within(rows, inside, block) -> tuple[Float[np.ndarray, "n n"], ...]:
+    return tuple(block(o) * inside[o[0]] for o in rows)
 
 
-def _times(view: ProbingView) -> Float[np.ndarray, " N"]:
-    return np.concatenate([s.time for s in view.segments])
+def _wander(time: Float[np.ndarray, " M"], share: float):
+    def block(o: np.ndarray) -> np.ndarray:
+        elapsed = time[o] / (float(np.ptp(time[o])) or 1.0)
+        return np.exp(-np.abs(elapsed[:, None] - elapsed) / share)
+
+    return block
+
+
+def _joined(view: ProbingView, what: str) -> Float[np.ndarray, " N"]:
+    return np.concatenate([getattr(s, what) for s in view.segments])
 
 
 def _travel(view: ProbingView, s) -> Float[np.ndarray, " n"]:
-    """How far a marker has moved, all components, in units of the largest displacement."""
+    """How far a marker has moved, all components, in units of the largest displacement; 0 for a force."""
+    if s.channel != "markers":
+        return np.zeros(len(s.time))
     marker = s.component.rsplit(" ", 1)[0]
     own = [o for o in view.segments if o.recording == s.recording and o.component.rsplit(" ", 1)[0] == marker]
     return np.sqrt(sum(np.interp(s.time, o.time, view.y[o.rows]) ** 2 for o in own))

@@ -22,6 +22,11 @@ PARTS = {
 }
 
 
+def _part(name: str) -> str:
+    stem, _, channel = name.partition(" of ")
+    return f"{PARTS[stem]}{f' ({channel})' if channel else ''}"
+
+
 def joined(names: list[str], word: str = "and") -> str:
     """a, b and c."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {word} {names[-1]}"
@@ -105,7 +110,7 @@ def sure(d: Diagnosis) -> list[str]:
         held = f", {math.sqrt(c.held / c.n_held):.3g} in the held-out ones" if a.bench.held_out else ""
         out.append(f"With the effects by {math.sqrt(c.chi2 / c.n):.3g} times{held}.")
     rest = a.rest()
-    large = [f"{PARTS[k]} {100 * v:.2g} %" for k, v in rest["parts"].items() if v > 1e-3 and k != "numerical"]
+    large = [f"{_part(k)} {100 * v:.2g} %" for k, v in rest["parts"].items() if v > 1e-3 and k != "numerical"]
     if large:
         out.append(f"What is left, by kind, as shares of the stress (typical amplitudes): {'; '.join(large)}.")
     if j.chosen.numerical:
