@@ -113,6 +113,21 @@ def test_a_page_that_never_draws_gets_few_frames_and_holds_no_other_up():
     assert played(scenario, patience=1e9) == 1
 
 
+def test_a_slow_page_hears_what_was_said_while_it_drew():
+    async def scenario(server, url):
+        server.session.told = lambda: "pace"
+        async with connect(url) as slow:
+            await slow.recv()
+            for _ in range(4):  # it never draws: a frame comes when patience ends, and with it the word
+                while isinstance(text := await slow.recv(), bytes):
+                    pass
+                if "told" in json.loads(text):
+                    return json.loads(text)["told"]
+        return None
+
+    assert played(scenario, patience=0.6) == "pace"
+
+
 @pytest.mark.parametrize(
     "nonsense", ["{", "[1]", '{"probe": [1, 2]}', '{"probe": [0, 0, "x"]}', '{"probe": [NaN, 0, 0]}', '{"drawn": {}}']
 )

@@ -77,7 +77,7 @@ class Server:
 
     async def _page(self, connection: ServerConnection) -> None:
         await connection.send(json.dumps({"model": plain(self.session.model)}))
-        self.pages[connection] = [0, 0.0]  # number of the frame not yet drawn, when it was sent
+        self.pages[connection] = [0, 0.0, {}]  # number of the frame not yet drawn, when it was sent, words to be told
         with contextlib.suppress(ConnectionClosed):
             async for text in connection:
                 try:
@@ -106,16 +106,19 @@ class Server:
             told = now if words else told
             if self.session.error:
                 words["error"], self.session.error = self.session.error, None
-            await asyncio.gather(*(self._send(page, number, frame, words, now) for page in list(self.pages)))
+            for state in self.pages.values():  # a slow page hears what was said while it drew
+                state[2] |= words
+            await asyncio.gather(*(self._send(page, number, frame, now) for page in list(self.pages)))
 
-    async def _send(self, page: ServerConnection, number: int, frame: bytes, words: dict, now: float) -> None:
+    async def _send(self, page: ServerConnection, number: int, frame: bytes, now: float) -> None:
         state = self.pages.get(page)
         if state is None or (state[0] and now - state[1] < self.patience):
             return
+        words = state[2]
         with contextlib.suppress(ConnectionClosed, asyncio.TimeoutError):
             async with asyncio.timeout(0.5):
                 if words:
                     await page.send(json.dumps(words))
-                state[:] = number, now
+                state[:] = number, now, {}
                 await page.send(frame)
                 self.sent += 1

@@ -16,6 +16,7 @@ class Run:
 
     Attributes:
         points, cells: mesh, m. times: of the states, s. states: displacement, m. force_times, force: s, N.
+        radius, path_times, path: of the probe, m and s; 0 and none where the file tells nothing of a round one.
     """
 
     def __init__(self, path: str | Path):
@@ -31,6 +32,10 @@ class Run:
                 stored = file["states/displacement"]
                 self.states = np.array([stored[str(k)][...] for k in range(len(stored))])
                 self.force_times, self.force = file["channels/time"][...], file["channels/force"][...]
+                self.radius, self.path_times, self.path = 0.0, np.zeros(1), np.zeros((1, 3))
+                if "probe" in file:
+                    self.radius = float(file["probe/radius"][()])
+                    self.path_times, self.path = file["probe/time"][...], file["probe/position"][...]
         except (OSError, KeyError) as fault:
             raise InputError(
                 f"{path}: not a stored run ({fault}); wanted are points, cells, states and channels"
@@ -48,6 +53,10 @@ class Run:
         """Force at t, linear between frames."""
         return np.array([np.interp(t, self.force_times, column) for column in self.force.T])
 
+    def probe_at(self, t: float) -> Float[np.ndarray, "3"]:
+        """Centre of the probe at t, m."""
+        return np.array([np.interp(t, self.path_times, column) for column in self.path.T])
+
 
 class RunSession(Session):
     """A stored run, over and over."""
@@ -61,7 +70,7 @@ class RunSession(Session):
         largest = float(np.abs(run.states).max()) or 1e-3
         super().__init__({
             "kind": "run", "title": name, "what": f"a stored run of {len(run.cells)} elements, {len(run.times)} states",
-            "wrong": ["as it was simulated; between states linear"], "playback": True, "radius": 0.0,
+            "wrong": ["as it was simulated; between states linear"], "playback": True, "radius": run.radius,
             "low": (middle[:2] - span / 2).tolist(), "high": (middle[:2] + span / 2).tolist(), "depth": largest,
             "start": [*middle[:2].tolist(), float(run.points[:, 2].max())], "high_z": float(run.points[:, 2].max()),
             "middle": middle.tolist(), "span": span, "points": coded(run.points),
@@ -71,7 +80,8 @@ class RunSession(Session):
     def advance(self, seconds: float) -> None:
         first, last = float(self.run.times[0]), float(self.run.times[-1])
         self.clock = first + (self.clock - first + seconds) % (last - first)
-        self.force, self.depth = self.run.force_at(self.clock), 1e-9
+        self.force, self.depth = self.run.force_at(self.clock), -1.0
+        self.position = self.run.probe_at(self.clock)
 
     def body(self) -> np.ndarray:
         return self.run.shape(self.clock)

@@ -44,7 +44,8 @@ def run_to_file(
 
     Args:
         scene: frames are rounded up to whole chunks.
-        path: `/channels/*` grow by frames, `/states/displacement/K` (N, 3) after chunk K, `/resume` is the last state.
+        path: `/channels/*` grow by frames, `/states/displacement/K` (N, 3) after chunk K, `/resume` is the last state;
+            `/probe` is the path of a round probe.
         progress: told after each chunk.
         chunks: stop after so many (None: to the end).
         chunk: frames in each; a run is gone on with in the chunks it began with.
@@ -64,6 +65,7 @@ def run_to_file(
         else:
             file["points"], file["cells"] = np.asarray(scene.body.points), np.asarray(scene.body.cells)
             file.attrs["cell_type"] = scene.body.element.cells
+            _tell_probe(file, scene.probe)
         stop = total if chunks is None else min(total, done + chunks)
         with progress.stage("simulating", total=stop - done) as stage:
             for k in range(done, stop):
@@ -81,6 +83,15 @@ def run_to_file(
                 file.flush()
                 stage.advance(note=f"t = {float(out.end_time[-1]):.3g} s")
     return path
+
+
+def _tell_probe(file: h5py.File, probe) -> None:
+    """Path (m, over s) and radius (m) of a round probe, so that a run can be shown with it."""
+    if probe is None or not np.isfinite(float(probe.shape.reach())):
+        return
+    offset = 0.0 if probe.offset is None else np.asarray(probe.offset)
+    file["probe/time"], file["probe/position"] = np.asarray(probe.time), np.asarray(probe.position) + offset
+    file["probe/radius"] = float(probe.shape.reach())
 
 
 def _append(file: h5py.File, name: str, values) -> None:
