@@ -109,8 +109,7 @@ class ProbingBench(Bench):
             self.start[path] *= ratio if self.free[path].unit == "Pa" else 1.0
         tests = [setup.test for setup in self.ready.setups.values()]
         session = max(float(t.start) for t in tests) + max(float(np.max(s.time)) for s in self.segments)
-        priors = {f"{n}.{k}": v for n, e in every.items() for k, v in e.misjudged.items()}
-        priors |= {"aging.rate": AGED / session}
+        priors = {"aging.rate": AGED / session}
         mu, height = ratio * float(guess), float(max(t.height for t in tests))
         # a base gives way by as much as the tissue over it: no fixed length a pascal is small for soft and stiff alike
         scales = {"base-slip.compliance": 0.2 * height / mu, "base-slip.fluidity": 0.04 * height / mu}

@@ -15,6 +15,7 @@ TIMED = {
     "viscoelasticity": None,
     "periodic": None,
     "aging": None,
+    "clock-lag": None,
     "drift": ("rate", "settling"),
     "compressibility": ("drained", "time"),
 }  # effects that need a clock, or the parameters of them that do

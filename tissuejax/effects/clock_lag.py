@@ -1,35 +1,56 @@
-"""Markers and force on different clocks."""
+"""Force and displacement, or force and markers, on different clocks."""
 
 from collections.abc import Mapping
 from typing import ClassVar
 
-from jaxtyping import Array
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
 
-from tissuejax.effects.effect import Effect
+from tissuejax.effects.effect import Effect, Respond
+from tissuejax.effects.material_test import MaterialTest
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.recordings.recording import Channel
 
 
 class ClockLag(Effect):
-    """A marker frame stamped t shows the tissue at t - lag. Neutral: 0.
+    """In a material test, stress stamped t is that of the stretch at t - lag; in a probing, a marker frame stamped t
+    shows the tissue at t - lag. Neutral: 0.
 
-    Reveals: marker residuals in proportion to marker velocity while the force fits. Blind: recordings without
-    markers, or at rest.
+    Revealed by residuals in proportion to the rate of what was done, none in holds: in a probing by markers alone.
+    Blind: recordings at one rate without holds (it then looks like hysteresis), or at rest; probings without markers.
+    Source: Lister 2012, 2.2.1 (force at 62.5 Hz and cameras at 15 Hz on separate clocks).
     """
 
     name: ClassVar[str] = "clock-lag"
-    kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
-    reveals: ClassVar[str] = "marker residuals proportional to marker velocity, none in holds"
-    blind: ClassVar[str] = "recordings without markers; holds; material tests"
-    words: ClassVar[tuple[str, ...]] = ("the markers' clock is {lag} late",)
+    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    reveals: ClassVar[str] = "residuals proportional to the rate of what was done, none in holds"
+    blind: ClassVar[str] = "ramps at one rate without holds; holds alone; probings without markers"
+    words: ClassVar[tuple[str, ...]] = ("the clocks are {lag} apart",)
+    needs: ClassVar[str] = "rates"
+    misjudged: ClassVar[Mapping[str, float]] = {"lag": 0.2}
     source: ClassVar[str] = "Lister 2012, 2.2.1 (force at 62.5 Hz and cameras at 15 Hz on separate clocks)"
     amplitudes: ClassVar[tuple[str, ...]] = ("lag",)
     order: ClassVar[int] = 0
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter("lag", "s", 0.0, -1.0, 1.0, "how late the marker clock is", scale=0.05),)
+        return (Parameter("lag", "s", 0.0, -1.0, 1.0, "how late the clock of stress or markers is", scale=0.05),)
+
+    def stretch(
+        self, p: Mapping[str, Array], test: MaterialTest, drive: Float[Array, "n ..."], respond: Respond
+    ) -> Float[Array, "n ..."]:
+        # from the left: at a sample a lag sees what was before, and before the first one nothing had happened
+        clock = -jnp.concatenate([test.time[:1] - 1.0, test.time])[::-1]
+
+        def at(lag: Array) -> Float[Array, "n ..."]:
+            def one(x: Float[Array, " n"]) -> Float[Array, " n"]:
+                return jnp.interp(lag - test.time, clock, jnp.concatenate([x[:1], x])[::-1])
+
+            return one(drive) if drive.ndim == 1 else jax.vmap(one, 1, 1)(drive)
+
+        return drive + (at(p["lag"]) - at(jnp.zeros_like(p["lag"])))
 
     def channels(
         self, p: Mapping[str, Array], test: ProbingTest, channels: Mapping[str, Channel]

@@ -1,0 +1,68 @@
+"""The rig's own faults are named as such: clocks that differ, a load cell that bends; and relaxation is neither."""
+
+import numpy as np
+import pytest
+
+from tissuejax.diagnosis.diagnose import diagnose
+from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.recordings.recording import Channel, Recording, Sample
+
+TRIED = ("clock-lag", "load-cell-bend", "viscoelasticity", "energy-form", "slack")
+MU, NOISE, AREA = 800.0, 3.0, 4e-4
+QUICK = Effort(most=1, singles=5, reshaped=(1, 0, 0), starts=1)
+
+
+def elastic(stretch):
+    return MU * (stretch - stretch**-2)
+
+
+def sample(recorded) -> Sample:
+    """Pulls and pushes at three rates with holds, neo-Hookean in closed form; `recorded` makes the cell's reading."""
+    rng, made = np.random.default_rng(5), {}
+    for name, far, ramp in (
+        ("slow pull", 1.3, 5.0),
+        ("quick pull", 1.25, 0.6),
+        ("push", 0.78, 2.0),
+        ("last", 1.2, 1.0),
+    ):
+        time = np.arange(0, 3 * ramp + 6, 0.05)
+        knots = [0, 1, 1 + ramp, 4 + ramp, 4 + 2 * ramp]
+
+        def path(t, knots=knots, far=far):
+            return np.interp(t, knots, [1, 1, far, far, 1])
+
+        y = recorded(time, path) + NOISE * rng.standard_normal(len(time))
+        inputs = {"time": time, "stretch": path(time)}
+        told = {"area": AREA, "height": 0.01}
+        made[name] = Recording(name, "uniaxial", inputs, {"nominal_stress": Channel(time, y, "Pa", NOISE)}, told)
+    return Sample("rig", made)
+
+
+def relaxed(time, path, g=0.3, tau=1.5):
+    """Nominal stress of a Maxwell arm on the whole stress, by its exact recursion."""
+    s, step = elastic(path(time)), time[1] - time[0]
+    q, decay = np.zeros(len(s)), np.exp(-step / tau)
+    for i in range(1, len(s)):
+        q[i] = decay * q[i - 1] + (1 - decay) * tau / step * (s[i] - s[i - 1])
+    return (1 - g) * s + g * q
+
+
+@pytest.mark.parametrize(
+    ("recorded", "name", "path", "value"),
+    [
+        (lambda t, path: elastic(path(t - 0.12)), "clock-lag", "effects.clock-lag.lag", 0.12),
+        (
+            lambda t, path: elastic(path(t)) * (1 + 0.9 * AREA * np.abs(elastic(path(t)))),
+            "load-cell-bend",
+            "effects.load-cell-bend.bend",
+            0.9,
+        ),
+        (relaxed, "viscoelasticity", None, None),
+    ],
+    ids=["clocks", "bent cell", "relaxation"],
+)
+def test_a_fault_of_the_rig_has_its_name_and_tissue_has_not(recorded, name, path, value):
+    found = diagnose(sample(recorded), "neo-hookean", effects=TRIED, effort=QUICK)
+    assert found.verdict.judgement.names == (name,)
+    if path:
+        assert found.verdict.chosen.values[path] == pytest.approx(value, rel=0.1)
