@@ -18,7 +18,7 @@ from tissuejax.diagnosis.judgement.evidence import write_evidence
 from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.judgement.judge import Kind
 from tissuejax.diagnosis.known import known_physics, label, tell
-from tissuejax.diagnosis.material import MaterialBench, modes
+from tissuejax.diagnosis.material import MaterialBench, held_strains, modes
 from tissuejax.diagnosis.next_experiment import proposals, settling
 from tissuejax.diagnosis.next_probing import probing_proposals
 from tissuejax.diagnosis.offered import HYSTERESIS, SCATTER, offered
@@ -150,8 +150,10 @@ def diagnose(
             of = probing_discrepancy(whole, cut)
         else:
             cut = blocks(whole)
-            alike = modes(whole) if kind == "homogeneous" else dict.fromkeys(every, kind)
-            of = discrepancy(series(whole, cut, alike), cut.spread(whole.sigma))
+            homogeneous = kind == "homogeneous"
+            alike = modes(whole) if homogeneous else dict.fromkeys(every, kind)
+            seen = series(whole, cut, alike, held_strains(whole) if homogeneous else None)
+            of = discrepancy(seen, cut.spread(whole.sigma))
         found = answer(bench, whole, cut, of, effort, told)
         made = {"homogeneous": _material, "probing": _probing, "cutting": _cutting}[kind](sample, energy, base, found)
     if found.evidence.exhausted:

@@ -358,3 +358,9 @@ def modes(bench: MaterialBench) -> dict[str, tuple]:
         n: (t.mode, float(t.second), float(t.swell), tuple(np.round(t.frame, 6).ravel().tolist()))
         for n, t in bench._tests.items()
     }
+
+
+def held_strains(bench: MaterialBench) -> dict[str, float]:
+    """By recording, the logarithm of the stretch that shear is done at; empty where all are sheared at rest."""
+    found = {n: float(np.log(t.axial)) for n, t in bench._tests.items()}
+    return found if any(found.values()) else {}

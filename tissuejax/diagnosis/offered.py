@@ -5,6 +5,7 @@ says what it needs (`Effect.needs`), a property of the protocol, which is asked 
 is fitted; a clock is needed by all that acts in time (`untimed`).
 """
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -20,6 +21,9 @@ HYSTERESIS = Candidate("hysteresis", (), widens={"hysteresis": 0.15})
 BACK = 0.05  # of the range of stretch: less of a way back is no unloading
 STILL = 0.05  # of the quickest rate: slower is a hold
 RATES = 1.5  # ratio from which two rates are two
+NEAR = 0.05  # of the largest strain: strains closer than this are one
+SHARED = 0.5  # of a recording's samples
+POINTS = 200  # of a recording's path that are compared
 HELD = 0.05  # of a recording's time: a shorter hold is none
 
 
@@ -36,8 +40,8 @@ class Protocol:
         directions: specimens are loaded along several directions.
         sides: pulled and pressed.
         sizes: specimens differ in size.
-        repeated: several recordings load one direction in one kind of test. Where every mode is recorded once, a
-            stiffness of each recording's own is a law that fails to carry from mode to mode.
+        repeated: some strains were passed by several recordings. Where each goes a way of its own, a stiffness of
+            each recording's own is a law that fails to carry from one strain to another.
 
     Derived: `constraints` (some test holds what a change of volume would move), `unlike` (specimens or modes that the
     same rig loads unlike).
@@ -69,7 +73,7 @@ class Protocol:
         drives = [d for r in recordings for d in driven(r)]
         moves = [motion(t, x) for t, x in drives]
         quick = [m[1] for m in moves if m[1] > 0]
-        directions = {mode(r)[1] for r in recordings}
+        directions = {direction(r) for r in recordings}
         kinds = frozenset(r.experiment for r in recordings)
         back = any(m[0] for m in moves)
         return cls(
@@ -80,13 +84,29 @@ class Protocol:
             directions=len(directions) > 1 or "biaxial" in kinds,
             sides=any(np.min(x) < -1e-3 for _, x in drives) and any(np.max(x) > 1e-3 for _, x in drives),
             sizes=len({(r.attributes.get("area"), r.attributes.get("height")) for r in recordings}) > 1,
-            repeated=len({mode(r) for r in recordings}) < len(recordings),
+            repeated=any(overlap(a, b) > SHARED for a, b in itertools.permutations(recordings, 2) if alike(a, b)),
         )
 
 
-def mode(r: Recording) -> tuple:
-    """What kind of test it is, and along which direction."""
-    return r.experiment, tuple(np.round(np.asarray(r.attributes.get("direction", (0, 0, 0)), float), 6))
+def direction(r: Recording) -> tuple[float, ...]:
+    """Which it is loaded along."""
+    return tuple(np.round(np.asarray(r.attributes.get("direction", (0, 0, 0)), float), 6))
+
+
+def alike(a: Recording, b: Recording) -> bool:
+    """Whether two recordings are one kind of test along one direction, sheared at one axial stretch."""
+    axial = [float(r.attributes.get("axial_stretch", 1.0)) for r in (a, b)]
+    return (a.experiment, direction(a)) == (b.experiment, direction(b)) and abs(axial[0] - axial[1]) < 1e-6
+
+
+def overlap(a: Recording, b: Recording) -> float:
+    """Share of the samples of `a`, those near rest left out, whose strain `b` passes too."""
+    one, other = (np.stack([x for _, x in driven(r)], axis=1) for r in (a, b))
+    one, other = (x[np.unique(np.linspace(0, len(x) - 1, POINTS).astype(int))] for x in (one, other))
+    near = NEAR * float(np.max(np.abs(np.concatenate([one, other]))))
+    one = one[np.linalg.norm(one, axis=1) > near]
+    apart = np.min(np.linalg.norm(one[:, None] - other[None], axis=-1), axis=1) if len(one) else np.zeros(0)
+    return float(np.mean(apart <= near)) if len(apart) else 0.0
 
 
 def driven(r: Recording) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -118,7 +138,7 @@ LACKING: Mapping[str, str] = {  # property of a protocol: what is said where it 
     "unlike": "one specimen in one mode can't tell the rig's compliance from the tissue's",
     "reversed": "nothing is unloaded",
     "rates": "ramps at one rate, without holds",
-    "repeated": "no mode was recorded more than once",
+    "repeated": "no strain was passed by several recordings",
 }
 
 

@@ -69,12 +69,21 @@ def blocks(bench: Bench, several: Mapping[str, int] | None = None) -> Blocks:
     return Blocks(flat, np.diff(np.append(flat, len(bench.y))), np.array(owner))
 
 
-def series(bench: Bench, cut: Blocks, modes: Mapping[str, object]) -> list[Series]:
-    """The blocks as the discrepancy sees them; `modes` says by recording what kind of test it is."""
+def series(
+    bench: Bench, cut: Blocks, modes: Mapping[str, object], held: Mapping[str, float] | None = None
+) -> list[Series]:
+    """The blocks as the discrepancy sees them.
+
+    Args:
+        modes: by recording, what kind of test it is.
+        held: by recording, a strain that is not driven but differs between recordings of a mode; none by default.
+    """
     out = []
     for k, s in enumerate(bench.segments):
         own = Blocks(cut.starts[cut.owner == k] - s.rows.start, cut.counts[cut.owner == k], np.zeros(0, int))
         driven = np.stack([strain(o) for o in bench.segments if o.recording == s.recording], axis=1)
+        if held:
+            driven = np.append(driven, np.full((len(driven), 1), held[s.recording]), axis=1)
         peaks = [np.quantile(np.abs(bench.y[o.rows]), 0.98) for o in bench.segments if o.recording == s.recording]
         out.append(
             Series(
