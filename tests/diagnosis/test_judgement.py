@@ -5,22 +5,22 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
+from scipy.stats import halfnorm, multivariate_normal
 
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence, SetEvidence, read_evidence, write_evidence
 from tissuejax.diagnosis.judgement.judge import Kind, judge
-from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, amplitude_mass, amplitudes, marginal
+from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, amplitude_mass, amplitudes, marginal
 from tissuejax.estimation.discrepancy import BAND, Part, Series, discrepancy, loading_states
 
 FORMS = {"relaxation": 2, "slack": 1, "drift": 3}
 
 
-def weighed(names, log_evidence, rest=1e-8, label="", void=False):
+def weighed(names, log_evidence, rest=1e-8, void=False):
     keys = tuple(names)
     numbers = {"fit": 0.0, "parameters": 0.0, "discrepancy": 0.0, "amplitudes": {}, "k": 2, "at_bound": ()}
     more = {"chi2": 100.0, "n": 100, "kurtosis": 0.0, "explained": 0.5, "rest": (rest, 1e-2 * rest)}
-    return SetEvidence(keys, keys, label, log_evidence, void=void, **numbers, **more)
+    return SetEvidence(keys, keys, log_evidence, void=void, **numbers, **more)
 
 
 def evidence(*sets):
@@ -31,7 +31,7 @@ def evidence(*sets):
 def test_no_other_verdict_has_a_larger_stated_probability(seed):
     rng = np.random.default_rng(seed)
     sets = [weighed(n, rng.normal(0, 4), 10 ** rng.uniform(-7, -2)) for n in ([], ["relaxation"], ["slack"], ["drift"])]
-    sets += [weighed(["relaxation", "slack"], rng.normal(0, 4)), weighed([], rng.normal(0, 4), label="unknown")]
+    sets += [weighed(["relaxation", "slack"], rng.normal(0, 4))]
     j = judge(evidence(*sets))
     assert j.confidence == max(j.probabilities.values())
     assert sum(j.probabilities.values()) == pytest.approx(1.0)
@@ -39,9 +39,8 @@ def test_no_other_verdict_has_a_larger_stated_probability(seed):
 
 
 def test_probabilities_by_hand():
-    """Two sets, no unknown: odds are prior odds times the ratio of evidences; slack has a third of 0.4, one form."""
-    criteria = Criteria(unknown=0.1)
-    j = judge(evidence(weighed([], 0.0), weighed(["slack"], math.log(12.0))), criteria)
+    """Two sets: odds are prior odds times the ratio of evidences; slack has a third of 0.4, one form."""
+    j = judge(evidence(weighed([], 0.0), weighed(["slack"], math.log(12.0))))
     odds = 12.0 * (0.4 / 3) / 0.4
     assert j.inclusion["slack"] == pytest.approx(odds / (1 + odds))
     assert j.kind is Kind.FOUND
@@ -67,7 +66,6 @@ def test_a_base_that_leaves_something_of_note_is_unexplained_and_one_that_does_n
     sets = [weighed(["slack"], -20.0)]
     assert judge(evidence(weighed([], 0.0, rest=1e-8), *sets)).kind is Kind.NOTHING
     assert judge(evidence(weighed([], 0.0, rest=1e-3), *sets)).kind is Kind.UNEXPLAINED
-    assert judge(evidence(weighed([], -90.0), weighed([], 0.0, label="unknown"), *sets)).kind is Kind.UNEXPLAINED
 
 
 def test_equal_evidence_of_several_names_is_ambiguous():
@@ -94,7 +92,7 @@ def test_an_effect_that_rests_at_neutral_does_not_count():
 
 
 def test_evidence_comes_back_from_its_file_and_gives_the_same_verdict(tmp_path):
-    sets = evidence(weighed([], 0.0), weighed(["slack"], 2.0), weighed([], -1.0, label="unknown"))
+    sets = evidence(weighed([], 0.0), weighed(["slack"], 2.0), weighed(["slack", "drift"], -1.0))
     again = read_evidence(write_evidence(sets, tmp_path / "evidence.json"))
     assert again == sets
     assert judge(again) == judge(sets)
@@ -169,26 +167,40 @@ def test_the_information_is_the_trace_of_the_dense_matrices():
 
 def test_amplitudes_find_the_gain_that_was_put_in_and_rest_where_nothing_is():
     linear, parts, blocked = made()
-    widths = np.full(len(parts), 0.02)
-    v, m = amplitudes(linear, parts, widths, blocked, widths**2)
+    widths = Widths(np.full(len(parts), 0.02), np.zeros(len(parts)))
+    v, m = amplitudes(linear, parts, widths, blocked, widths.width**2)
     share = dict(zip((p.name for p in parts), np.sqrt(v), strict=True))
     assert math.hypot(share["gain"], share["own law"]) == pytest.approx(0.02, rel=0.5)  # of its own, at any strain
     assert share["law"] < 0.01
     assert share["white"] < 0.006
-    assert np.isfinite(amplitude_mass(m, v, widths))
+    assert np.isfinite(amplitude_mass(linear, parts, widths, blocked, v, m))
 
 
-def test_the_mass_over_one_amplitude_is_its_integral():
-    """One part alone: log of int p(y | a) p(a) da by quadrature over the amplitude, within a tenth of a nat or two."""
+@pytest.mark.parametrize(("width", "chance"), [(0.02, 0.0), (0.02, 0.1), (0.002, 0.1)])
+def test_the_mass_over_one_amplitude_is_its_integral(width, chance):
+    """One part alone: log of int p(y | a) p(a) da by quadrature over the amplitude, to a few tenths of a nat."""
     linear, parts, blocked = made(n=40)
-    part, width = parts[2:3], np.array([0.02])
-    v, _ = amplitudes(linear, part, width, blocked, width**2)
-    m = marginal(linear, part, v, blocked)
-    a = np.linspace(0, 0.15, 1200)
+    part, priors = parts[2:3], Widths(np.array([width]), np.array([chance]))
+    start, _ = amplitudes(linear, part, priors.widest, blocked, priors.width**2)
+    v, m = amplitudes(linear, part, priors, blocked, start)
+    a = np.linspace(0, 0.3, 2400)
     logs = np.array([marginal(linear, part, np.array([x**2]), blocked).value for x in a])
-    logs += 0.5 * math.log(2 / math.pi) - math.log(0.02) - 0.5 * (a / 0.02) ** 2
-    exact = math.log(np.trapezoid(np.exp(logs - m.value), a))
-    assert amplitude_mass(m, v, width) == pytest.approx(exact, abs=0.4)
+    density = (1 - chance) * halfnorm(scale=width).pdf(a) + chance * halfnorm(scale=10 * width).pdf(a)
+    exact = math.log(np.trapezoid(np.exp(logs - m.value) * density, a))
+    assert amplitude_mass(linear, part, priors, blocked, v, m) == pytest.approx(exact, abs=0.4)
+
+
+def test_the_prior_of_an_amplitude_is_two_half_normals():
+    priors = Widths(np.array([0.01, 0.02]), np.array([0.0, 0.1]), 10.0)
+    a = np.array([0.015, 0.07])
+    usual, wide = halfnorm(scale=priors.width).pdf(a), halfnorm(scale=10 * priors.width).pdf(a)
+    expected = np.log((1 - priors.chance) * usual + priors.chance * wide)
+    np.testing.assert_allclose(priors.log_density(a**2), expected)
+    u, h = (a / priors.width) ** 2, 1e-6
+    np.testing.assert_allclose(
+        priors.slope(u), (priors.log_shape(u + h) - priors.log_shape(u - h)) / (2 * h), rtol=1e-6
+    )
+    assert priors.wider(a**2).tolist() == [False, bool(0.1 * wide[1] > 0.9 * usual[1])]
 
 
 def test_the_loading_state_knows_the_way_and_not_the_rate():

@@ -150,14 +150,14 @@ class Diagnosis:
         """The best sets of effects, each in its best form, with their evidence and probability."""
         a, best = self.answered, {}
         for s in a.evidence.sets:
-            name = s.label or " + ".join(sorted(s.names))
+            name = " + ".join(sorted(s.names))
             if not s.void and math.isfinite(s.log_evidence):
                 best[name] = max(best.get(name, s), s, key=lambda x: x.log_evidence)
         top = max(s.log_evidence for s in best.values())
         rows = [
             {
-                "effects": list(s.keys) or ([s.label] if s.label else []),
-                "probability": a.judgement.posterior.get("?" if s.label else name, 0.0),
+                "effects": list(s.keys),
+                "probability": a.judgement.posterior.get(name, 0.0),
                 "log_evidence_below_best": top - s.log_evidence,
                 "criterion": 2 * (top - s.log_evidence),
                 "information_criterion": s.chi2 + s.k * math.log(s.n) if math.isfinite(s.chi2) else None,

@@ -13,13 +13,13 @@ class Criteria:
     Attributes:
         sizes: probability that 0, 1, 2, 3 effects of the catalogue act that the base model lacks. Ground: as often
             something as nothing, and rarely much at once; spread evenly over the names, and over the forms of a name.
-        unknown: probability that something acts that neither the catalogue nor an ordinary discrepancy has. Ground: as
-            likely as two effects at once; taken off the others in proportion.
+        unknown: probability that the discrepancy is far larger than usual in one of its parts: something acts that the
+            catalogue doesn't have, beside whatever else acts. Ground: as likely as two effects at once.
         shares: standard deviation of the half-normal prior of a discrepancy's amplitude, a share of the stress, by
             family. Ground: what the best published laws leave of careful recordings, 1 to 4 % of the peak in all; of a
             marker, of what it moved (it is not quite where it was registered); of the numerical error, in units of
             what mesh and step leave open by Richardson's extrapolation.
-        strange: the same where something unknown acts, by which factor more. Ground: 10 makes of 1 to 2 % the 10 to
+        strange: by which factor such a part is wider. Ground: 10 makes of 1 to 2 % the 10 to
             20 % by which effects of the catalogue change a recording.
         change: standard deviation of the half-normal (two-sided: normal) prior of an effect's amplitude: the change of
             the stress that it makes alone, as a share of the stress (root mean squares). Ground: effects worth a name

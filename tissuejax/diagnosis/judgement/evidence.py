@@ -20,7 +20,6 @@ class SetEvidence:
     Attributes:
         keys: candidates (effect/form) in the set, in the order in which they were added.
         names: their effects, each once.
-        label: "" or the hypothesis without a name ("unknown": a discrepancy far larger than usual).
         log_evidence: log p(measurements | set), nats; the sum of the next three.
         fit: log density of the measurements at the fit, parameters' and amplitudes' factors left out.
         parameters: log of prior times posterior width of the free parameters (Occam's factor).
@@ -40,7 +39,6 @@ class SetEvidence:
 
     keys: tuple[str, ...]
     names: tuple[str, ...]
-    label: str
     log_evidence: float
     fit: float
     parameters: float

@@ -26,7 +26,6 @@ from tissuejax.diagnosis.starts import distinct, inside
 from tissuejax.errors import NotConverged
 from tissuejax.estimation.discrepancy import Discrepancy
 
-UNKNOWN = "unknown"
 HOPEFUL = 8.0  # nats below the best set up to which other forms and further effects of a set are tried
 GIVEN_UP = 20.0  # nats below the best set: a set is not followed to the end of its fit
 LITTLE = -4.0  # nats: a nominee whose linear step promises less is not weighed
@@ -68,7 +67,7 @@ class Exploration:
 
     Attributes:
         bench: all recordings fitted.
-        weighed: by set of keys; the unknown under {UNKNOWN}.
+        weighed: by set of keys.
         scored: linear scores at each set that was extended.
     """
 
@@ -101,9 +100,7 @@ class Exploration:
     def ranked(self, size: int) -> list[frozenset]:
         """The best form of every set of `size` effects, best first."""
         found: dict[frozenset, frozenset] = {}
-        for key in sorted((k for k in self.weighed if k != frozenset({UNKNOWN}) and len(k) == size), key=self.worth)[
-            ::-1
-        ]:
+        for key in sorted((k for k in self.weighed if len(k) == size), key=self.worth)[::-1]:
             if self.worth(key) > -math.inf:
                 found.setdefault(self.names(key), key)
         return list(found.values())
@@ -114,18 +111,19 @@ class Exploration:
         return [k for k in self.ranked(size) if self.worth(k) > top - HOPEFUL]
 
     def parents(self, size: int) -> list[frozenset]:
-        """Sets to grow: those near the top; all of `ranked` as long as something unknown is likelier than any name."""
+        """Sets to grow: those near the top; all of `ranked` as long as the best one leaves more than is usual."""
         return self.ranked(size) if self.strange else self.near(size)
 
     @property
     def strange(self) -> bool:
-        """Whether something unknown is more probable than every set so far."""
-        return self.worth(frozenset({UNKNOWN})) > self.worth(self.best)
+        """Whether the best set leaves a part of the discrepancy that is likelier something unknown."""
+        priors = self.scales.priors(self.criteria, self.weighed[self.best].evidence.keys)
+        return bool(np.any(priors.wider(self.weighed[self.best].v)))
 
     @property
     def best(self) -> frozenset:
         """The most probable of all sets of known effects."""
-        return max((k for k in self.weighed if k != frozenset({UNKNOWN})), key=self.worth)
+        return max(self.weighed, key=self.worth)
 
     def evidence(self, fitted: tuple[str, ...], held_out: tuple[str, ...]) -> Evidence:
         """All of it as plain numbers."""
@@ -175,7 +173,7 @@ class Exploration:
             return []
         columns = bench.columns(values, wanted)
         jac = bench.jacobian(values, tuple(values), bench.fitted)
-        usual = scales.priors(self.criteria, {}) ** 2
+        usual = scales.priors(self.criteria).width ** 2
         found: dict[str, Score] = {}
         for v in (at.v, usual):
             whitening = Whitening(bench, scales.cut, scales.blocked, at.parts, v)
@@ -229,7 +227,7 @@ class Exploration:
                     break
                 seen.setdefault(self.bench.candidates[s.key].name, []).append(s)
             lists.append([(key, rows[0]) for rows in itertools.islice(seen.values(), each)])
-        tried = {self.names(k) for k in self.weighed if k != frozenset({UNKNOWN})}
+        tried = {self.names(k) for k in self.weighed}
         for row in itertools.zip_longest(*lists):
             for key, score in filter(None, row):
                 company = self.names(key | {score.key})
@@ -270,7 +268,7 @@ class Exploration:
 
     def same(self, a: frozenset, b: frozenset) -> bool:
         """Whether two sets hold the same effects."""
-        return frozenset({UNKNOWN}) not in (a, b) and self.names(a) == self.names(b) and len(a) == len(b)
+        return self.names(a) == self.names(b) and len(a) == len(b)
 
     def leave_out(self, key: frozenset) -> None:
         """Weigh the set without each of its effects, from where it came to rest."""
@@ -278,14 +276,6 @@ class Exploration:
         for k in parent.evidence.keys if len(key) > 1 else ():
             order = tuple(x for x in parent.evidence.keys if x != k)
             self.weigh(order, [parent.refit.values], v=parent.v)
-
-    def unknown(self) -> None:
-        """Weigh the base beside a discrepancy far larger than usual."""
-        base = self.weighed[frozenset()]
-        wide = {family: share * self.criteria.strange for family, share in self.criteria.shares.items()}
-        self.weighed[frozenset({UNKNOWN})] = weigh(
-            self.scales, (), base.refit.values, self.criteria, v=base.v, wide=wide, label=UNKNOWN
-        )
 
 
 def explore(
@@ -322,11 +312,10 @@ def explore(
     e.extend([frozenset()], effort.singles, effort.singles)
     for key in e.near(1)[: effort.reshaped[0]]:
         e.reshape(key)
-    e.unknown()
     for size, most in ((1, effort.pairs), (2, effort.triples)):
         parents = e.parents(size)[: effort.parents[size - 1]]
         if size >= effort.most or not parents or (size == 2 and len(e.best) < 2 and not e.strange):
-            break  # a third effect is sought where a second one has come in, or where no name is likely yet
+            break  # a third effect is sought where a second one has come in, or much is left
         if effort.stepwise and len(e.best) < size:
             break
         e.extend(parents, most, max(most // len(parents), 1) + 2)

@@ -3,8 +3,8 @@
 The posterior of a set is its prior times its evidence, over the sum of all that were weighed (what was never tried has
 none, and that is said). Effects are named that are likelier present than not. The five answers divide what may be true:
 
-- nothing-missing: no effect of the catalogue, nothing unknown, and a rest that is negligible;
-- unexplained: something unknown, or no effect of the catalogue and a rest that is not negligible;
+- nothing-missing: no effect of the catalogue, and a rest that is negligible;
+- unexplained: no effect of the catalogue, and a rest that is not negligible;
 - found: exactly the effects named, and a negligible rest;
 - found-in-part: the effects named, and more: a rest of note, or further effects;
 - ambiguous: effects of the catalogue, but not those named.
@@ -47,7 +47,7 @@ class Judgement:
         exact: probability that exactly the effects named are present.
         chosen: the set whose fit is shown: of the answer, or the best attempt.
         alternatives: named sets beside the chosen one, with their probabilities, most probable first.
-        posterior: by set of names ("" for none, "?" for something unknown), its probability.
+        posterior: by set of names ("" for none), its probability.
         negligible: probability that what the chosen set leaves is negligible.
     """
 
@@ -70,12 +70,9 @@ class Judgement:
 
 def log_prior(s: SetEvidence, forms: Mapping[str, int], criteria: Criteria) -> float:
     """Log prior probability of a set in these forms."""
-    known = math.log1p(-criteria.unknown)
-    if s.label:
-        return math.log(criteria.unknown)
     size = len(s.names)
     share = criteria.sizes[size] / math.comb(len(forms), size) if size < len(criteria.sizes) else 0.0
-    return known + (math.log(share) if share else -math.inf) - sum(math.log(forms[n]) for n in s.names)
+    return (math.log(share) if share else -math.inf) - sum(math.log(forms[n]) for n in s.names)
 
 
 def negligible(s: SetEvidence, criteria: Criteria) -> float:
@@ -91,15 +88,13 @@ def judge(evidence: Evidence, criteria: Criteria | None = None) -> Judgement:
     usable = [s for s in evidence.sets if not s.void and math.isfinite(s.log_evidence)]
     groups: dict[frozenset, list[tuple[float, SetEvidence]]] = {}
     for s in usable:
-        key = frozenset({s.label}) if s.label else frozenset(s.names)
-        groups.setdefault(key, []).append((s.log_evidence + log_prior(s, evidence.forms, criteria), s))
+        groups.setdefault(frozenset(s.names), []).append((s.log_evidence + log_prior(s, evidence.forms, criteria), s))
     weights = {k: float(logsumexp([w for w, _ in rows])) for k, rows in groups.items()}
     whole = float(logsumexp(list(weights.values())))
     p = {k: math.exp(w - whole) for k, w in weights.items()}
     best = {k: max(rows, key=lambda r: r[0])[1] for k, rows in groups.items()}
     empty = frozenset()
-    unknown = [k for k in p if best[k].label]
-    named = [k for k in p if k != empty and k not in unknown]
+    named = [k for k in p if k != empty]
     inclusion = {n: sum(p[k] for k in named if n in k) for n in evidence.forms}
     stated = frozenset(n for n, x in inclusion.items() if x > criteria.named)
     with_them = sum(p[k] for k in named if stated and stated <= k)
@@ -109,7 +104,7 @@ def judge(evidence: Evidence, criteria: Criteria | None = None) -> Judgement:
         Kind.NOTHING: p.get(empty, 0.0) * quiet.get(empty, 0.0),
         Kind.FOUND: exact * quiet.get(stated, 0.0) if stated else 0.0,
         Kind.AMBIGUOUS: sum(p[k] for k in named) - with_them,
-        Kind.UNEXPLAINED: sum(p[k] for k in unknown) + p.get(empty, 0.0) * (1 - quiet.get(empty, 0.0)),
+        Kind.UNEXPLAINED: p.get(empty, 0.0) * (1 - quiet.get(empty, 0.0)),
     }
     chances[Kind.IN_PART] = max(1.0 - sum(chances.values()), 0.0)
     kind = max(Kind, key=lambda k: chances[k])
@@ -124,7 +119,7 @@ def judge(evidence: Evidence, criteria: Criteria | None = None) -> Judgement:
         exact,
         chosen,
         tuple((best[k], p[k]) for k in ranked[:10]),
-        {best[k].label and "?" or " + ".join(sorted(k)): p[k] for k in sorted(p, key=lambda k: -p[k])},
+        {" + ".join(sorted(k)): p[k] for k in sorted(p, key=lambda k: -p[k])},
         negligible(chosen, criteria),
     )
 
@@ -142,7 +137,7 @@ def _chosen(kind, stated, named, p, best, empty) -> SetEvidence:
 def covering(judgement: Judgement, criteria: Criteria | None = None) -> tuple[tuple[SetEvidence, float], ...]:
     """Alternatives that, with the chosen set, cover `Criteria.covered` of the probability of named sets."""
     criteria = criteria or Criteria()
-    total = sum(p for name, p in judgement.posterior.items() if name not in ("", "?"))
+    total = sum(p for name, p in judgement.posterior.items() if name)
     at = judgement.posterior.get(" + ".join(sorted(judgement.chosen.names)), 0.0)
     out = []
     for s, p in judgement.alternatives:

@@ -7,8 +7,8 @@ smooth parts, and H = J'K^-1 J + weak,
     log p(y | v) = -1/2 (r'K^-1 r + o'weak o - b'H^-1 b) - 1/2 log|K| - 1/2 log|H| + const,   b = J'K^-1 r - weak o,
 
 o being theta less the prior's mean. Smooth parts and parameters are handled alike, as columns W = [U sqrt(V), J] with
-precisions 1 and `weak`: all costs are those of the blocks. Amplitudes a = sqrt(v) have half-normal priors, so in v the
-whole has a slope at zero and an amplitude can rest there.
+precisions 1 and `weak`: all costs are those of the blocks. Amplitudes a = sqrt(v) have half-normal priors with a
+heavier tail (`Widths`), so in v the whole has a slope at zero and an amplitude can rest there.
 
 Source: restricted likelihood, Harville 1977, JASA 72; Woodbury's identity; Laplace's method for posterior mass, Kass
 and Raftery 1995, JASA 90, sec. 4.1.
@@ -23,7 +23,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpotrf, dpotri
-from scipy.optimize import lsq_linear
+from scipy.optimize import brentq, lsq_linear
+from scipy.special import logsumexp
 
 from tissuejax.estimation.discrepancy import Part
 
@@ -186,10 +187,59 @@ def _derivatives(
     return 0.5 * slope, 0.5 * fisher
 
 
+@dataclass(frozen=True)
+class Widths:
+    """Prior of the amplitudes: half-normal, with a chance of being wider.
+
+        p(a) = (1 - chance) HN(a; width) + chance HN(a; factor width)
+
+    Attributes:
+        width: by part, shares of the stress.
+        chance, factor: that a part is wider, and by how much.
+    """
+
+    width: Float[np.ndarray, " K"]
+    chance: Float[np.ndarray, " K"]
+    factor: float = 10.0
+
+    def _two(self, u: Float[np.ndarray, "... K"]) -> tuple[np.ndarray, np.ndarray]:
+        with np.errstate(divide="ignore"):
+            usual, wide = np.log1p(-self.chance), np.log(self.chance / self.factor)
+        return usual - 0.5 * u, wide - 0.5 * u / self.factor**2
+
+    def log_shape(self, u: Float[np.ndarray, "... K"]) -> Float[np.ndarray, "... K"]:
+        """log p(a) at u = (a / width)^2, but for what it is where nothing is wider and a = 0."""
+        return np.logaddexp(*self._two(u))
+
+    def log_density(self, v: Float[np.ndarray, "... K"]) -> Float[np.ndarray, "... K"]:
+        """log p(a) at v = a^2."""
+        return self.log_shape(v / self.width**2) + 0.5 * math.log(2 / math.pi) - np.log(self.width)
+
+    def slope(self, u: Float[np.ndarray, " K"]) -> Float[np.ndarray, " K"]:
+        """Derivative of `log_shape` by u."""
+        usual, wide = self._two(u)
+        share = np.exp(wide - np.logaddexp(usual, wide))
+        return -0.5 * (1 - share + share / self.factor**2)
+
+    def part(self, k: int) -> "Widths":
+        """Of one part alone."""
+        return Widths(self.width[k : k + 1], self.chance[k : k + 1], self.factor)
+
+    @property
+    def widest(self) -> "Widths":
+        """All wider that may be."""
+        return Widths(self.width * np.where(self.chance > 0, self.factor, 1.0), np.zeros(len(self.width)))
+
+    def wider(self, v: Float[np.ndarray, " K"]) -> Float[np.ndarray, " K"]:
+        """By part, whether an amplitude is likelier one of the wide ones."""
+        usual, wide = self._two(v / self.width**2)
+        return wide > usual
+
+
 def amplitudes(
     linear: Linear,
     parts: Sequence[Part],
-    priors: Float[np.ndarray, " K"],
+    priors: Widths,
     blocked: Blocked,
     start: Float[np.ndarray, " K"],
     most: int = 15,
@@ -197,17 +247,18 @@ def amplitudes(
 ) -> tuple[Float[np.ndarray, " K"], Marginal]:
     """Squared amplitudes at the maximum of evidence and prior, and the evidence there.
 
-    Newton's method with the Fisher information, each step a quadratic programme inside v >= 0, halved until it gains.
+    Newton's method with the Fisher information, each step a quadratic programme inside v >= 0, shortened until it
+    gains. Where parts may be wider there are two basins: begin where all that may be wide is (`Widths.widest`).
     """
-    unit = priors**2
+    unit = priors.width**2
 
     def worth(m: Marginal, u: np.ndarray) -> float:
-        return m.value - 0.5 * float(np.sum(u))
+        return m.value + float(np.sum(priors.log_shape(u)))
 
-    u = np.clip(start / unit, 0.0, 100.0)
+    u = np.clip(start / unit, 0.0, (10 * priors.factor) ** 2)
     m = marginal(linear, parts, u * unit, blocked)
     for _ in range(most):
-        g, f = m.slope * unit - 0.5, m.fisher * np.outer(unit, unit)
+        g, f = m.slope * unit + priors.slope(u), m.fisher * np.outer(unit, unit)
         size = 1 / np.sqrt(np.diag(f) + 1e-12)
         values, vectors = np.linalg.eigh(f * np.outer(size, size))
         root = np.sqrt(np.maximum(values, 0.02))  # parts alike; blocks taken for diagonal
@@ -233,28 +284,54 @@ def amplitudes(
     return u * unit, m
 
 
-def amplitude_mass(m: Marginal, v: Float[np.ndarray, " K"], priors: Float[np.ndarray, " K"]) -> float:
+def amplitude_mass(
+    linear: Linear, parts: Sequence[Part], priors: Widths, blocked: Blocked, v: Float[np.ndarray, " K"], m: Marginal
+) -> float:
     """Log of the posterior mass over the amplitudes, over the evidence at its maximum: priors and Occam's factor.
 
-    Evidence and prior are taken quadratic in v about their maximum, so that a resting amplitude and one far from zero
-    are the two ends of one formula; integrated over a = sqrt(v) by quadrature, correlations by their determinant.
+    The evidence of an amplitude at rest is taken quadratic in v, of one that moved quadratic in ln(v + c), c such that
+    it falls to what the evidence is without that part; with the prior integrated over a = sqrt(v) by quadrature,
+    correlations by their determinant.
     """
-    slope = m.slope - 0.5 / priors**2
-    curvature = np.maximum(np.diag(m.fisher), 1e-300)
-    total = 0.0
     x, weights = NODES
-    for at, g, h, prior in zip(v, np.minimum(slope, 0.0), curvature, priors, strict=True):
-        g = 0.0 if at > 0 else float(g)
-        wide = 8 / math.sqrt(h)
-        low, top = math.sqrt(max(at - wide, 0.0)), math.sqrt(at + min(wide, 30 / max(-g, 1e-300)))
+    moving = np.flatnonzero(v > 1e-3 * priors.width**2)
+    slope, curvature, total = np.array(m.slope), np.maximum(np.diag(m.fisher), 1e-300), 0.0
+    tilt = slope + priors.slope(v / priors.width**2) / priors.width**2  # of the whole, prior and all
+    for k, (at, g, h) in enumerate(zip(v.tolist(), slope.tolist(), curvature.tolist(), strict=True)):
+        wide, offset = 8 / math.sqrt(h), math.inf
+        if k in moving:
+            without = v.copy()
+            without[k] = 0.0
+            g, offset = max(g, 0.0), _offset(at, g, h, m.value - marginal(linear, parts, without, blocked).value)
+        elif tilt[k] < 0:
+            wide = min(wide, 30 / -tilt[k])
+        low, top = math.sqrt(max(at - wide, 0.0)), math.sqrt(at + wide)
+        if math.isfinite(offset):
+            reach = math.exp(8 / (math.sqrt(h) * (at + offset)))
+            low, top = (
+                math.sqrt(max((at + offset) / reach - offset, 0.0)),
+                math.sqrt(at + offset) * min(reach, 1e4) ** 0.5,
+            )
         a = low + 0.5 * (top - low) * (x + 1)
-        d = a**2 - at
-        mass = 0.5 * (top - low) * float(np.sum(weights * np.exp(g * d - 0.5 * h * d**2)))
-        density = 0.5 * math.log(2 / math.pi) - math.log(prior) - 0.5 * at / prior**2
-        total += density + math.log(max(mass, 1e-300))
-    moving = np.flatnonzero(v > 1e-3 * priors**2)
+        d = a**2 - at if math.isinf(offset) else (at + offset) * np.log((a**2 + offset) / (at + offset))
+        density = priors.part(k).log_density((a**2)[:, None])[:, 0]
+        total += float(logsumexp(g * d - 0.5 * h * d**2 + density, b=0.5 * (top - low) * weights))
     if len(moving) > 1:
         f = m.fisher[np.ix_(moving, moving)]
         scale = 1 / np.sqrt(np.diag(f))
         total -= 0.5 * float(np.linalg.slogdet(f * np.outer(scale, scale) + 1e-3 * np.eye(len(moving)))[1])
     return total
+
+
+def _offset(at: float, slope: float, curvature: float, fall: float) -> float:
+    """c with slope d - curvature d^2 / 2 = -fall at v = 0, d = (at + c) ln((v + c) / (at + c)); infinite where none."""
+
+    def short(log_c: float) -> float:
+        c = at * math.exp(log_c)
+        d = (at + c) * math.log(c / (at + c))
+        return fall + slope * d - 0.5 * curvature * d**2
+
+    low, high = -30.0, 10.0
+    if short(high) <= 0 or short(low) >= 0:
+        return math.inf if short(high) <= 0 else at * math.exp(low)
+    return at * math.exp(brentq(short, low, high, xtol=1e-2))

@@ -24,6 +24,7 @@ from tissuejax.diagnosis.judgement.evidence import SetEvidence
 from tissuejax.diagnosis.judgement.marginal import (
     Blocked,
     Linear,
+    Widths,
     amplitude_mass,
     amplitudes,
     smooth,
@@ -67,9 +68,18 @@ class Scales:
             return parts
         return (*parts, Part("numerical", "numerical", self.cut.mean(bench.numerical)))
 
-    def priors(self, criteria: Criteria, wide: Mapping[str, float]) -> Float[np.ndarray, " K"]:
-        """Prior widths of the amplitudes; `wide` gives families another one."""
-        return np.array([wide.get(f, criteria.shares[f]) for f in self.families])
+    def priors(self, criteria: Criteria, keys: Sequence[str] = ()) -> Widths:
+        """Prior of the amplitudes where the effects `keys` act.
+
+        A family whose widening has a name that these recordings can show is wide with that name alone; any other may
+        be wider without one.
+        """
+        candidates = self.bench.candidates
+        named = {f for c in candidates.values() for f in c.widens}
+        wide = {f: w for key in keys for f, w in candidates[key].widens.items()}
+        free = np.array([f not in named for f in self.families])
+        width = np.array([wide.get(f, criteria.shares[f]) for f in self.families])
+        return Widths(width, free * criteria.unknown / max(int(np.sum(free)), 1), criteria.strange)
 
     def effect_size(self, candidate: Candidate, values: Mapping[str, float], criteria: Criteria) -> dict[str, float]:
         """For every amplitude of a candidate, the value that changes the stress by `change` of it, to first order.
@@ -164,8 +174,6 @@ def weigh(
     start: Mapping[str, float],
     criteria: Criteria,
     v: Float[np.ndarray, " K"] | None = None,
-    wide: Mapping[str, float] | None = None,
-    label: str = "",
     rounds: int = ROUNDS,
     iterations: int = 12,
     floor: float = -math.inf,
@@ -174,14 +182,11 @@ def weigh(
 
     Args:
         v: squared amplitudes to begin with; of their prior's size by default.
-        wide: prior widths by family that differ from the criteria's (something unknown; a gain that is a name).
-        label: name of such a hypothesis.
         floor: log evidence below which the set is hopeless and not followed further.
     """
     names = scales.bench.fitted
-    wide = {f: w for key in keys for f, w in scales.bench.candidates[key].widens.items()} | dict(wide or {})
-    widths = scales.priors(criteria, wide)
-    v = widths**2 if v is None else v
+    widths = scales.priors(criteria, keys)
+    anew, v = v is None, widths.width**2 if v is None else v
     bench, priors = with_priors(scales, keys, start, criteria)
     y, best = scales.cut.mean(bench.y), None
     at, tolerance, raw = dict(start), 0.5, None
@@ -216,6 +221,8 @@ def weigh(
         dead = np.max(np.abs(jac), axis=0, initial=0.0) * descent.scale <= NOTHING * scales.peak
         inner = ~bound & ~(dead & (weak == 0))
         linear = Linear(residual, jac[:, inner], offset[inner], weak[inner])
+        if anew:
+            v, anew = amplitudes(linear, parts, widths.widest, scales.blocked, v, tolerance=SETTLED)[0], False
         v, m = amplitudes(linear, parts, widths, scales.blocked, v)
         value = m.value + 0.5 * int(np.sum(inner)) * math.log(2 * math.pi)
         value += sum(
@@ -225,7 +232,7 @@ def weigh(
         )
         # what rests on a bound was left out of the integral: its own factor, and its prior's square, follow
         held = _on_bounds(scales, parts, v, residual, jac, x, descent, bound, weak, offset)
-        occam = amplitude_mass(m, v, widths)
+        occam = amplitude_mass(linear, parts, widths, scales.blocked, v, m)
         total = value + held + occam
         if best is None or total > best[0] + 1e-6:
             gained = math.inf if best is None else total - best[0]
@@ -236,8 +243,8 @@ def weigh(
             break
         at, tolerance = dict(fit.values), 0.1
     if best is None:
-        return _impossible(scales, keys, label)
-    return _described(scales, keys, label, best)
+        return _impossible(scales, keys)
+    return _described(scales, keys, best)
 
 
 def _on_bounds(scales, parts, v, residual, jac, x, descent, bound, weak, offset) -> float:
@@ -267,19 +274,19 @@ def _on_bounds(scales, parts, v, residual, jac, x, descent, bound, weak, offset)
     return total
 
 
-def _impossible(scales: Scales, keys: Sequence[str], label: str) -> Weighed:
+def _impossible(scales: Scales, keys: Sequence[str]) -> Weighed:
     """A set whose model can't be predicted anywhere near."""
     names = tuple(dict.fromkeys(scales.bench.candidates[k].name for k in keys))
     n = len(scales.cut.starts)
     low = SetEvidence(
-        tuple(keys), names, label, -math.inf, -math.inf, 0.0, 0.0, {}, 0, (), True, math.inf, n, 0.0, 0.0, (0.0, 0.0)
+        tuple(keys), names, -math.inf, -math.inf, 0.0, 0.0, {}, 0, (), True, math.inf, n, 0.0, 0.0, (0.0, 0.0)
     )
     none = np.full(len(scales.bench.y), np.nan)
     fit = Refit(tuple(keys), {}, {}, {}, (), math.inf, n, math.inf, 0, False, none)
     return Weighed(low, fit, np.zeros(len(scales.families)), (), np.zeros(n))
 
 
-def _described(scales: Scales, keys: Sequence[str], label: str, best: tuple) -> Weighed:
+def _described(scales: Scales, keys: Sequence[str], best: tuple) -> Weighed:
     total, value, occam, fit, v, m, bound, descent, residual, parts, bench = best
     smoothed, scatter = _rest(scales, parts, v, residual)
     chi2 = float(np.sum((residual / scales.blocked.sigma) ** 2))
@@ -298,7 +305,6 @@ def _described(scales: Scales, keys: Sequence[str], label: str, best: tuple) -> 
     evidence = SetEvidence(
         keys=tuple(keys),
         names=tuple(dict.fromkeys(bench.candidates[k].name for k in keys)),
-        label=label,
         log_evidence=total,
         fit=density,
         parameters=value - density,
