@@ -307,10 +307,10 @@ def amplitude_mass(
             wide = min(wide, 30 / -tilt[k])
         low, top = math.sqrt(max(at - wide, 0.0)), math.sqrt(at + wide)
         if math.isfinite(offset):
-            reach = math.exp(8 / (math.sqrt(h) * (at + offset)))
+            reach = math.exp(min(8 / (math.sqrt(h) * (at + offset)), 9.0))
             low, top = (
                 math.sqrt(max((at + offset) / reach - offset, 0.0)),
-                math.sqrt(at + offset) * min(reach, 1e4) ** 0.5,
+                math.sqrt(at + offset) * reach**0.5,
             )
         a = low + 0.5 * (top - low) * (x + 1)
         d = a**2 - at if math.isinf(offset) else (at + offset) * np.log((a**2 + offset) / (at + offset))
