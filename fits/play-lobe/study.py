@@ -1,6 +1,6 @@
 """Is a precomputed probing as good as the full model, and quick enough for a hand? A table and a figure.
 
-tissuejax study fits/play-lobe       some minutes of precomputing on two cores (kept in out/play-lobe), then five
+tissuejax study fits/play-lobe       some minutes of precomputing on two cores (kept in out/play-lobe), then ten
 """
 
 import json
@@ -15,9 +15,12 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
+from tissuejax.effects.adhesion import Adhesion
+from tissuejax.effects.friction import Friction
 from tissuejax.effects.viscoelasticity import Viscoelasticity
 from tissuejax.energies import catalogue
 from tissuejax.errors import InputError
+from tissuejax.experiments.probing import assembled
 from tissuejax.mesh.columns import box, lobe_of_mesh
 from tissuejax.model import Model
 from tissuejax.play import haptics
@@ -25,11 +28,13 @@ from tissuejax.progress import for_terminal
 from tissuejax.storage import write_json
 from tissuejax.surrogate import store
 from tissuejax.surrogate.live.ask import Asker
+from tissuejax.surrogate.live.native import Native
 from tissuejax.surrogate.places import Box
 from tissuejax.surrogate.precompute import precompute
 from tissuejax.surrogate.predict import force_along
-from tissuejax.surrogate.ramp import Matter
-from tissuejax.surrogate.site_mesh import Grid
+from tissuejax.surrogate.ramp import Matter, bare_setup
+from tissuejax.surrogate.site_mesh import Grid, geometry, topology
+from tissuejax.tled.simulate import run
 
 jax.config.update("jax_enable_x64", True)
 
@@ -39,11 +44,12 @@ WANTED = Box(np.array([-0.012, -0.012]), np.array([0.012, 0.012]), 7e-3, (5, 5),
 SECONDS = 60.0
 
 
-def matter() -> Matter:
-    """A slab of liver-like tissue that relaxes, and the ball of the recordings."""
-    model = Model(catalogue.energy("reduced-polynomial-2"), catalogue.volumetric("quadratic"), (Viscoelasticity(),))
-    values = {"energy.C10": 645.0, "energy.C20": 500.0, "volumetric.K": 20e3}
-    values = model.defaults | values | {f"effects.viscoelasticity.{k}": v for k, v in PRONY.items()}
+def matter(*effects, **values) -> Matter:
+    """A slab of liver-like tissue and the ball of the recordings; it relaxes unless other effects are named."""
+    if not effects:
+        effects, values = (Viscoelasticity(),), {f"effects.viscoelasticity.{k}": v for k, v in PRONY.items()}
+    model = Model(catalogue.energy("reduced-polynomial-2"), catalogue.volumetric("quadratic"), effects)
+    values = model.defaults | {"energy.C10": 645.0, "energy.C20": 500.0, "volumetric.K": 20e3} | values
     return Matter(model, values, lobe_of_mesh(box(SIZE, (4, 4, 2))), RADIUS, 1060.0)
 
 
@@ -95,50 +101,99 @@ PHASES = {
 }
 
 
-def drag(surrogate, counts=(24, 20, 8), speed: float = 5.0) -> dict:
-    """A relaxing press, hold, drag, hold and lift against TLED on a fixed finer mesh."""
-    from tissuejax.experiments.probing import assembled
-    from tissuejax.surrogate.ramp import bare_setup
-    from tissuejax.surrogate.site_mesh import geometry, topology
-    from tissuejax.tled.simulate import run
+def full(tissue: Matter, counts, t, path, speed: float) -> tuple[np.ndarray, np.ndarray, int]:
+    """Times and forces of TLED on a fixed mesh along a path, `speed` times faster than life; and the elements."""
+    grid, interval = Grid(counts, 1.25 * RADIUS), float(t[1] - t[0])
+    body = geometry(tissue.lobe, np.zeros(2), grid)
+    setup = bare_setup(tissue, body, topology(grid)[2], np.zeros(2), TOP + RADIUS)
+    scene, _ = assembled(tissue.model, {k: jnp.asarray(float(v)) for k, v in tissue.values.items()}, setup)
+    scene = scene.put({
+        "probe.time": jnp.asarray(t), "probe.position": jnp.asarray(path), "clock.start": jnp.asarray(-interval / 2),
+        "clock.interval": jnp.asarray(interval), "clock.compression": jnp.asarray(speed), "clock.frames": len(t),
+        "clock.steps": int(np.ceil(interval / speed / float(scene.clock.step))),
+    }).cast(jnp.float32)  # fmt: skip
+    out = run(scene)
+    return np.asarray(out.time, float), np.asarray(out.force, float), len(body.cells)
 
+
+def along(surrogate, t, path, at) -> np.ndarray:
+    """The surrogate's force along a path, at given times."""
+    ours = np.asarray(force_along(surrogate, jnp.asarray(t), jnp.asarray(path)))
+    return np.stack([np.interp(at, t, c) for c in ours.T], 1)
+
+
+def drawn() -> tuple[np.ndarray, np.ndarray]:
+    """Times and path: press 5 mm, hold, drag 6 mm, hold, lift."""
     t = np.arange(0, 8.0, 0.02)
     knots = [0, 0.2, 1.2, 3.2, 4.2, 6.2, 7.2, 8.0]
     d = np.interp(t, knots, [-1e-3, -1e-3 * 0.2, 5e-3, 5e-3, 5e-3, 5e-3, -1.5e-3, -1.5e-3])
     x = np.interp(t, knots, [-3e-3] * 4 + [3e-3] * 4)
-    path = np.stack([x, 0 * x, TOP + RADIUS - d], 1)
-    tissue, grid = matter(), Grid(counts, 1.25 * RADIUS)
-    body = geometry(tissue.lobe, np.zeros(2), grid)
-    setup = bare_setup(tissue, body, topology(grid)[2], np.zeros(2), TOP + RADIUS)
-    scene, _ = assembled(tissue.model, {k: jnp.asarray(float(v)) for k, v in tissue.values.items()}, setup)
-    steps = int(np.ceil(0.02 / speed / float(scene.clock.step)))
-    scene = scene.put({
-        "probe.time": jnp.asarray(t), "probe.position": jnp.asarray(path), "clock.start": jnp.asarray(-0.01),
-        "clock.interval": jnp.asarray(0.02), "clock.compression": jnp.asarray(speed), "clock.frames": len(t),
-        "clock.steps": steps,
-    }).cast(jnp.float32)  # fmt: skip
-    out = run(scene)
-    full, at = np.asarray(out.force, float), np.asarray(out.time, float)
-    ours = np.asarray(force_along(surrogate, jnp.asarray(t), jnp.asarray(path)))
-    ours = np.stack([np.interp(at, t, c) for c in ours.T], 1)
-    peak, phases = full[:, 2].max(), {}
+    return t, np.stack([x, 0 * x, TOP + RADIUS - d], 1)
+
+
+def drag(surrogate, tissue: Matter, counts=(16, 16, 6), speed: float = 1.5) -> dict:
+    """Press, hold, drag, hold, lift against TLED on a fixed mesh: rms of the difference over the peak, by phase."""
+    t, path = drawn()
+    at, force, elements = full(tissue, counts, t, path, speed)
+    ours, peak, phases = along(surrogate, t, path, at), force[:, 2].max(), {}
     for name, (a, b) in PHASES.items():
         on = (at >= a) & (at < b)
-        rms = np.sqrt(np.mean((ours - full)[on] ** 2, axis=0)) / peak
+        rms = np.sqrt(np.mean((ours - force)[on] ** 2, axis=0)) / peak
         phases[name] = {"vertical": float(rms[2]), "lateral": float(rms[0])}
-    pull = float(ours[at > 7.2, 2].min())
     return {
-        "elements": len(body.cells), "steps": steps * len(t), "peak_N": float(peak), "phases": phases,
-        "least_when_lifted_N": pull,
-        "series": {"time": at.tolist(), "full": full.tolist(), "surrogate": ours.tolist()},
+        "elements": elements, "times_faster_than_life": speed, "peak_N": float(peak), "phases": phases,
+        "least_when_lifted_N": float(ours[at > 7.2, 2].min()),
+        "series": {"time": at.tolist(), "full": force.tolist(), "surrogate": ours.tolist()},
     }  # fmt: skip
+
+
+def rubbed(surrogate, coefficients=(0.1, 0.3)) -> dict:
+    """Friction in the same drag, without relaxation, and what of the lateral force is friction's alone."""
+    found, bare = {}, surrogate.put({"memory.g": jnp.zeros(2)})
+    for mu in coefficients:
+        tissue = matter(Friction(), **{"effects.friction.coefficient": mu})
+        one = drag(bare.put({"rub.friction": mu}), tissue)
+        series = one.pop("series")
+        at, force, ours = (np.array(series[k]) for k in ("time", "full", "surrogate"))
+        sliding = (at > 3.7) & (at < 4.2)
+        one["lateral_when_sliding_N"] = {"full": force[sliding, 0].mean(), "surrogate": ours[sliding, 0].mean()}
+        found[f"coefficient {mu:g}"] = one
+    return found
+
+
+def pulled(t, depth, at, force) -> dict:
+    """The greatest pull, N, and the height over first contact at which the last half millinewton is gone, m."""
+    last = np.flatnonzero(force[:, 2] < -5e-4)
+    free = -np.interp(at[last[-1]], t, depth) if len(last) else 0.0
+    return {"greatest_pull_N": -float(force[:, 2].min()), "free_at_height_m": float(free)}
+
+
+def stuck(surrogate, strengths=(200.0, 1000.0), reach: float = 2e-4) -> dict:
+    """Adhesion without relaxation: the greatest pull on the way out and the height at which the ball comes free."""
+    found, bare = {}, surrogate.put({"memory.g": jnp.zeros(2)})
+    t = np.arange(0, 4.0, 0.01)
+    d = np.interp(t, [0, 1, 1.5, 4.0], [-3e-4, 3e-3, 3e-3, -4.5e-3])
+    path = np.stack([0 * t, 0 * t, TOP + RADIUS - d], 1)
+    for strength in strengths:
+        values = {"effects.adhesion.strength": strength, "effects.adhesion.reach": reach}
+        at, force, _ = full(matter(Adhesion(), **values), (16, 16, 6), t, path, 1.5)
+        ours = along(bare.put({"rub.strength": strength, "rub.reach": reach}), t, path, at)
+        found[f"{strength:g} Pa"] = {
+            "full": pulled(t, d, at, force), "surrogate": pulled(t, d, at, ours),
+            "rms_over_peak": float(np.sqrt(np.mean((ours - force)[:, 2] ** 2)) / force[:, 2].max()),
+        }  # fmt: skip
+    return found
+
+
+def plain_of(surrogate):
+    """Without memory."""
+    return type(surrogate)(**(vars(surrogate) | {"memory": None}))
 
 
 def speeds(surrogate) -> dict:
     """Seconds of CPU for one force in Python and for one picture's nodes."""
     asker, p = Asker(surrogate), np.array([0.001, 0.002, TOP + RADIUS - 4e-3])
-    plain = Asker(surrogate.put({"memory.g": jnp.zeros(2)}))
-    plain.memory = None
+    plain = Asker(plain_of(surrogate))
     out = {}
     for name, one in (
         ("python_force", lambda: plain.tick(p, 1e-3)),
@@ -148,6 +203,8 @@ def speeds(surrogate) -> dict:
         for _ in range(1000):
             one()
         out[name + "_us"] = 1e3 * (time.process_time() - cpu)
+    out["c_force_us"] = 1e6 * min(Native(plain_of(surrogate)).seconds() for _ in range(5))
+    out["c_force_relaxing_us"] = 1e6 * min(Native(surrogate).seconds() for _ in range(5))
     modes = np.asarray(surrogate.surface.modes).reshape(len(surrogate.surface.modes), -1)
     cpu = time.process_time()
     for _ in range(200):
@@ -160,7 +217,7 @@ def looped(surrogate) -> dict:
     """The C loop beside two processes that do nothing but work."""
     busy = [subprocess.Popen([sys.executable, "-c", "while True: sum(range(100000))"]) for _ in range(2)]
     try:
-        elastic = haptics.loop(type(surrogate)(**(vars(surrogate) | {"memory": None})), seconds=SECONDS)
+        elastic = haptics.loop(plain_of(surrogate), seconds=SECONDS)
         relaxing = haptics.loop(surrogate, seconds=SECONDS)
     finally:
         for process in busy:
@@ -170,28 +227,29 @@ def looped(surrogate) -> dict:
 
 
 def replayed(out: Path, shared: Path) -> dict | None:
-    """p01's r3 by the surrogate of the fitted model and by direct TLED."""
+    """p01's r3 by the surrogate of the fitted model, on two meshes, and by direct TLED."""
     file = shared / "practice" / "p01.h5"
     if not file.is_file():
         return None
-    from tissuejax.cli import main as command
+    root, found = Path(__file__).resolve().parents[1], {}
+    for mesh, name in (("16x16x6", "p01.play.h5"), ("22x22x8", "p01-fine.play.h5")):
+        target = out / name
+        if not target.is_file():
+            _command([
+                "precompute", str(root / "probing-practice"), "--sample", str(file), "--recording", "r3", "--reach",
+                "1", "--spacing", "2", "--depth", "7", "--mesh", mesh, "--out", str(target), "--json",
+            ])  # fmt: skip
+        done = _command(["play", str(target), "--replay", str(file), "--recording", "r3", "--json"])
+        record = store.read(target).record
+        found[mesh] = json.loads(done) | {"error": record["error"], "numerical": record["numerical"]}
+    return found
 
-    target, root = out / "p01.play.h5", Path(__file__).resolve().parents[1]
-    if not target.is_file():
-        command([
-            "precompute", str(root / "probing-practice"), "--sample", str(file), "--recording", "r3", "--reach", "1",
-            "--spacing", "2", "--depth", "7", "--out", str(target), "--json",
-        ])  # fmt: skip
-    done = subprocess.run(
-        [sys.executable, "-m", "tissuejax", "play", str(target), "--replay", str(file), "--recording", "r3", "--json"],
-        capture_output=True, text=True,
-    )  # fmt: skip
+
+def _command(words: list[str]) -> str:
+    done = subprocess.run([sys.executable, "-m", "tissuejax", *words], capture_output=True, text=True)
     if done.returncode:
         raise InputError(done.stderr)
-    return json.loads(done.stdout) | {
-        "error": store.read(target).record["error"],
-        "numerical": store.read(target).record["numerical"],
-    }
+    return done.stdout
 
 
 def draw(found: dict) -> Figure:
@@ -247,10 +305,15 @@ def main(folder: Path) -> str:
     keep("line", line(surrogate))
     keep("loops", loops(surrogate))
     keep("speeds", speeds(surrogate))
-    found = drag(surrogate)
+    found = drag(surrogate, matter())
     draw(found).savefig(folder / "figures" / "drag.png", dpi=110)
     found.pop("series")
     keep("drag", found)
+    finer = drag(surrogate, matter(), (24, 20, 8), 5.0)
+    finer.pop("series")
+    keep("drag, finer mesh", finer)
+    keep("friction", rubbed(surrogate))
+    keep("adhesion", stuck(surrogate))
     keep("replay", replayed(out, shared))
     keep("haptics", looped(surrogate))
     error = result["error"]
