@@ -10,7 +10,10 @@ import pytest
 
 from tissuejax import effects as package
 from tissuejax.diagnosis.diagnose import diagnose
+from tissuejax.diagnosis.probing_catalogue import probing_entries
 from tissuejax.effects.catalogue import effects
+from tissuejax.energies.catalogue import energy
+from tissuejax.model import Model
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 RECIPE = Path(__file__).parents[2] / "docs" / "new-effect.md"
@@ -72,3 +75,54 @@ def test_the_new_effect_is_exactly_nothing_at_neutral(swelling):
     off = stresses(predictor(BASE.with_effects(swelling()), kinds, names).predict(VALUES))
     for name in names:
         np.testing.assert_array_equal(off[name], base[name])
+
+
+PROBING = '''
+from collections.abc import Mapping
+from typing import ClassVar
+
+from tissuejax.effects.effect import Effect
+from tissuejax.parameters import Parameter
+from tissuejax.recordings.recording import Channel
+
+
+class Crosstalk(Effect):
+    """The camera's trigger is heard in the force: force + gain. Revealed by it. Blind: none. Source: none."""
+
+    name: ClassVar[str] = "crosstalk"
+    kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    reveals: ClassVar[str] = "force at rest"
+    blind: ClassVar[str] = "nothing"
+    source: ClassVar[str] = "none"
+    amplitudes: ClassVar[tuple[str, ...]] = ("gain",)
+    misjudged: ClassVar[Mapping[str, float]] = {"gain": 0.2}
+
+    @property
+    def parameters(self):
+        return (Parameter("gain", "N", 0.0, scale=0.01),)
+
+    def channels(self, p, test, channels):
+        seen = channels["force"]
+        return {**channels, "force": Channel(seen.time, seen.values + p["gain"], seen.unit, seen.noise_std)}
+'''
+
+
+def test_a_new_effect_of_probings_is_a_candidate_without_another_edit(tmp_path, monkeypatch):
+    (tmp_path / "crosstalk.py").write_text(PROBING)
+    monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path)])
+    importlib.invalidate_caches()
+    try:
+        entry = next(e for e in probing_entries(1.0) if e.title == "crosstalk")
+        model = Model(energy("neo-hookean"), None, (entry.effect,))
+        free, start, (candidate,) = entry.declare(model, ("r1",), ("r2",))
+        assert candidate.amplitudes == ("effects.crosstalk.gain",)
+        assert start == {"effects.crosstalk.gain": 0.0}
+        assert free["effects.crosstalk.gain"].prior == (0.0, 0.2)
+    finally:
+        del sys.modules["tissuejax.effects.crosstalk"], package.crosstalk
+
+
+def test_every_effect_of_probings_is_a_candidate_unless_its_size_is_known():
+    entries = {e.title for e in probing_entries(1.0)}
+    assert entries == {n for n, e in effects("probing").items() if e.candidate}
+    assert "gravity" not in entries

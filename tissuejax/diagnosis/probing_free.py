@@ -153,14 +153,14 @@ def reported(bench: "ProbingBench", at: Mapping[str, float], path: str, h: float
     """Derivative by a parameter of sensors, from the prediction `origin`."""
     effect, out = bench.runs.effects[path.split(".")[1]], np.zeros(len(bench.y))
     for name in (*bench.fitted, *bench.held_out):
-        before, after = (_told(bench, effect, {**at, path: at[path] + d}, name, origin) for d in (0.0, h))
+        before, after = (_report(bench, effect, {**at, path: at[path] + d}, name, origin) for d in (0.0, h))
         for s in bench.segments:
             if s.recording == name and s.channel in after:
                 out[s.rows] = picked(after[s.channel] - before[s.channel], s, bench.finite) / h
     return out
 
 
-def _told(bench: "ProbingBench", effect: Effect, values: Mapping[str, float], name: str, origin: np.ndarray) -> dict:
+def _report(bench: "ProbingBench", effect: Effect, values: Mapping[str, float], name: str, origin: np.ndarray) -> dict:
     """What the sensors report of the prediction `origin` under one effect, full arrays.
 
     The prediction holds the effect already: what is asked for is only how its report changes, to first order.

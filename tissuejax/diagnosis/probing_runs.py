@@ -23,7 +23,7 @@ from tissuejax.experiments.probing_predictor import ProbingPredictor
 from tissuejax.model import Model
 from tissuejax.storage import replacing
 
-# The first group is in every program. Histories are dear in run time and stay apart.
+# The first group is in every program. Histories take long to run and stay apart.
 GROUPS = (
     (
         "aging",
@@ -57,7 +57,7 @@ class Runs:
         segments: of the bench; y its measurements.
         finite: which samples of its channel a segment holds.
         folder: where runs are kept; None keeps them in memory only.
-        told: called after every batch with the number of runs done so far.
+        report: called after every batch with the number of runs done so far.
         count: runs done. cost: runs asked for, done or found on disk, in those of the coarse simulation.
     """
 
@@ -67,12 +67,12 @@ class Runs:
     y: Float[np.ndarray, " N"]
     finite: Mapping[int, np.ndarray]
     folder: Path | None = None
-    told: Callable[[int], None] = lambda _: None
+    report: Callable[[int], None] = lambda _: None
     count: int = 0
     cost: float = 0.0
     _known: dict[tuple, np.ndarray] = field(default_factory=dict)
     _models: dict[tuple, ProbingPredictor] = field(default_factory=dict)
-    _told: str | None = None  # mesh, path and radius of the probe, sensors, effects, settings: all a run depends on
+    _depends: str | None = None  # mesh, path and radius of the probe, sensors, effects, settings: all a run depends on
 
     def __post_init__(self):
         one = self.ready[FINE]
@@ -82,7 +82,7 @@ class Runs:
             for own in [[s for s in self.segments if s.recording == n]]
         }
         ready = {k: (p.model, p.settings, p.setups) for k, p in self.ready.items()}
-        self._told = described((ready, self.effects, self.segments, self.y, self.finite))
+        self._depends = described((ready, self.effects, self.segments, self.y, self.finite))
 
     def many(self, asked: Sequence[Asked]) -> list[Float[np.ndarray, " N"]]:
         """Predictions, one long vector each: as measured where a recording wasn't asked for, NaN where a run failed."""
@@ -96,13 +96,13 @@ class Runs:
             for key, run in zip(missing, workers.run_all(jobs, processes), strict=True):
                 self._keep(key, self._cut(key[0], run))
             self.count += len(missing)
-            self.told(self.count)
+            self.report(self.count)
         out = []
         for row in keys:
-            told = self.y.copy()
+            predicted = self.y.copy()
             for key in row:
-                told[self.rows[key[0]]] = self._known[key]
-            out.append(told)
+                predicted[self.rows[key[0]]] = self._known[key]
+            out.append(predicted)
         return out
 
     def _price(self, kind: str) -> float:
@@ -152,9 +152,9 @@ class Runs:
         return np.full_like(out, np.nan) if int(run.failed) >= 0 else out
 
     def _path(self, key: tuple) -> Path | None:
-        if self.folder is None or self._told is None:
+        if self.folder is None or self._depends is None:
             return None
-        name = key_of(self._told, key)  # None where the code has moved since it was loaded
+        name = key_of(self._depends, key)  # None where the code has moved since it was loaded
         return None if name is None else self.folder / f"{name}.npy"
 
     def _find(self, key: tuple) -> bool:

@@ -73,7 +73,7 @@ class Diagnosis:
         effects = self.effects(a.chosen)
         stated = [e for e in effects if j.kind is Kind.AMBIGUOUS or e["name"] in j.names]
         return {
-            "verdict": a.kind,
+            "verdict": a.kind.value,
             "confidence": a.confidence,
             "probabilities": {k.value: p for k, p in j.probabilities.items()},
             "inclusion": dict(j.inclusion),

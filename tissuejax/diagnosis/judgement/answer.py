@@ -52,9 +52,9 @@ class Answered:
         return self.fitting.shown
 
     @property
-    def kind(self) -> str:
-        """The verdict as text."""
-        return self.judgement.kind.value
+    def kind(self) -> Kind:
+        """The verdict; it compares and prints as its text."""
+        return self.judgement.kind
 
     @property
     def confidence(self) -> float:
