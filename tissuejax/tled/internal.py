@@ -15,6 +15,7 @@ from jaxtyping import Array, Float, Int
 from tissuejax.elements.element import Forces, cofactor, determinant, parts
 from tissuejax.energies.strain import Strain
 from tissuejax.tensors import Sym
+from tissuejax.tled import native
 from tissuejax.tled.history import relax
 from tissuejax.tled.scene import Scene
 
@@ -222,6 +223,10 @@ def forces(scene: Scene, mesh: Mesh, u: Float[Array, "3 N"], history: History, s
 
     Total Lagrangian: f_a = sum_e V_e P . B_a with P = F S (Lister 2012, 4.3.1).
     """
+    loop = None if scene.body.element.averaged_pressure else native.loop(by_element, scene, mesh, history)
+    if loop is not None:
+        f, history = loop(u, step)
+        return barrier(f), history
     rows, count = parts(u), blocks(len(mesh.stiffness))
     if count == 1 or scene.body.element.averaged_pressure:
         fe, history = contributions(scene, mesh, rows, history, step)
@@ -249,9 +254,15 @@ def forces(scene: Scene, mesh: Mesh, u: Float[Array, "3 N"], history: History, s
 
 def contributions(scene: Scene, mesh: Mesh, u, history: History, step) -> tuple[Forces, History]:
     """What each element of `mesh` adds at its nodes, N; displacements and forces one array a component."""
+    return by_element(
+        scene, mesh, barrier(jnp.stack(barrier(tuple(take(row, mesh.cells) for row in u)))), history, step
+    )
+
+
+def by_element(scene: Scene, mesh: Mesh, ue: Float[Array, "3 k E"], history: History, step) -> tuple[Forces, History]:
+    """`contributions` of displacements by element."""
     element = scene.body.element
     shear = scene.settings.hourglass * scene.tissue.energy.initial_shear_modulus(scene.tissue.energy_values)
-    ue = barrier(jnp.stack(barrier(tuple(take(row, mesh.cells) for row in u))))
     F, memory = barrier(element.gradient(mesh.reference, ue))
     C = barrier(cauchy_green(F))
     S, history = barrier(stress(scene, mesh, C, history, step))

@@ -1,0 +1,1 @@
+"""Loops over elements as compiled C, written from what JAX traced; their derivatives are loops of the same kind."""

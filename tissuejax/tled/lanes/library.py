@@ -1,0 +1,108 @@
+"""A C compiler, where there is one: programs compiled once, kept by the hash of their text, and given to XLA by name.
+
+`TISSUEJAX_NATIVE=off` leaves everything to XLA, as where no compiler is: the same results to rounding, more slowly.
+"""
+
+import ctypes
+import functools
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import tempfile
+import threading
+from pathlib import Path
+
+import jax
+
+from tissuejax.cache.programs import own
+
+ENVIRONMENT = "TISSUEJAX_NATIVE"
+FLAGS = ("-O2", "-ftree-vectorize", "-march=native", "-std=gnu11", "-shared", "-fPIC", "-fopenmp-simd",
+         "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-w")  # fmt: skip
+VECTOR_MATH = ('-DSIMD=__attribute__((__simd__("notinbranch"),const))', "-lmvec")  # glibc's, where it has them
+KEPT = "native"  # subfolder of the programs that are kept
+
+_lock = threading.Lock()
+_loaded: dict[str, ctypes.CDLL] = {}
+
+
+class NotCompiled(Exception):
+    """The compiler refused."""
+
+
+@functools.cache
+def compiler() -> str | None:
+    """The C compiler, or None: none found, or switched off."""
+    if os.environ.get(ENVIRONMENT, "").lower() == "off" or jax.default_backend() != "cpu":
+        return None
+    named = os.environ.get("CC")
+    return next((found for name in (named, "cc", "gcc", "clang") if name and (found := shutil.which(name))), None)
+
+
+@functools.cache
+def _around() -> str:
+    """What a compiled program depends on beside its text: compiler, processor, JAX."""
+    told = subprocess.run([str(compiler()), "--version"], capture_output=True, text=True, check=False).stdout
+    try:
+        seen = Path("/proc/cpuinfo").read_text()
+        flags = next((line for line in seen.splitlines() if line.startswith(("flags", "Features"))), "")
+    except OSError:
+        flags = platform.processor()
+    return "\n".join((told, flags, platform.machine(), jax.__version__, " ".join((*FLAGS, *VECTOR_MATH))))
+
+
+def named(text: str) -> str:
+    """Compile a program, unless it was before, and register its handler with XLA; the name to call it by.
+
+    Raises:
+        NotCompiled: the compiler refused.
+    """
+    name = "tissuejax_" + hashlib.sha256(f"{_around()}\n{text}".encode()).hexdigest()[:32]
+    with _lock:
+        if name not in _loaded:
+            where = jax.config.jax_compilation_cache_dir  # that of `cache.programs`, unless JAX was told of another
+            kept = None if where is None or "://" in where or not own(Path(where)) else Path(where) / KEPT
+            found = _load(kept / f"{name}.so") if kept is not None else None
+            if found is None:
+                found = _compiled(text, name, kept)
+            jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(found.handler), platform="cpu")
+            _loaded[name] = found
+    return name
+
+
+def _load(path: Path) -> ctypes.CDLL | None:
+    try:
+        return ctypes.CDLL(str(path)) if path.exists() else None
+    except OSError:
+        return None
+
+
+def _compiled(text: str, name: str, kept: Path | None) -> ctypes.CDLL:
+    with tempfile.TemporaryDirectory() as scratch:
+        source, made = Path(scratch, f"{name}.c"), Path(scratch, f"{name}.so")
+        source.write_text(text)
+        include = f"-I{jax.ffi.include_dir()}"
+        told = ""
+        for extra in (VECTOR_MATH, ()):
+            command = [str(compiler()), *FLAGS, include, str(source), "-o", str(made), *extra, "-lm", "-Wl,-z,defs"]
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            found = _load(made) if done.returncode == 0 else None
+            if found is not None:
+                _keep(made, kept)
+                return found
+            told = done.stderr
+        raise NotCompiled(told[-500:])
+
+
+def _keep(made: Path, kept: Path | None) -> None:
+    if kept is None:
+        return
+    try:
+        kept.mkdir(parents=True, exist_ok=True, mode=0o700)
+        aside = kept / f".{made.name}.{os.getpid()}"
+        shutil.copyfile(made, aside)
+        os.replace(aside, kept / made.name)
+    except OSError:
+        return

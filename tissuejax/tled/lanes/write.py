@@ -1,0 +1,324 @@
+"""C of a loop over elements from the tape of one lane: gather at the nodes, arithmetic in vectors, add up at the nodes.
+
+Elements are taken in blocks of `WIDTH`, so that what passes from stage to stage stays in the first cache. What does not
+depend on the batch (the tangents of a Jacobian, say) is worked out once for all of it. The C is plain: vectors come
+from the compiler's `omp simd`, and it may neither reorder nor fuse by itself.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tissuejax.tled.lanes.tape import BATCH, LANE, UNIFORM, Node, Number
+
+WIDTH = 32
+TOP = """#include <stdint.h>
+#include <stddef.h>
+#include "xla/ffi/api/c_api.h"
+typedef {real} real;
+#if defined(__FMA__) || defined(__aarch64__)
+#define FMA(a, b, c) __builtin_fma{f}(a, b, c)
+#else
+#define FMA(a, b, c) ((a) * (b) + (c))
+#endif
+#ifndef SIMD
+#define SIMD
+#endif
+{functions}
+"""
+VECTOR = ("exp", "log", "pow", "sin", "cos")  # vector forms wherever the C library has any
+OTHER = ("expm1", "log1p", "tanh", "erf", "acos", "asin", "atan", "atan2", "sinh", "cosh", "cbrt")
+TWO = ("pow", "atan2")
+SIGN = {"add": "+", "sub": "-", "mul": "*", "div": "/", "gt": ">", "lt": "<", "ge": ">=", "le": "<=", "eq": "==",
+        "ne": "!=", "and": "&", "or": "|"}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One argument or result of a loop.
+
+    Attributes:
+        kind: "nodal" (c, N), gathered or added up by element; "lane" (..., E); "uniform" (...), the same for all
+            elements, as a result a sum over them.
+        shape: without batch and without the last axis (for "nodal": c).
+        batched: whether there is one for each member of the batch.
+    """
+
+    kind: str
+    shape: tuple[int, ...]
+    batched: bool = False
+
+    @property
+    def rows(self) -> int:
+        """Numbers by element, node or altogether."""
+        return int(np.prod(self.shape, dtype=int))
+
+
+def written(precision: str, corners: int, ins: list[Slot], inputs: list[list[Node]], outs: list[Slot],
+            outputs: list[list[Number]]) -> str:  # fmt: skip
+    """The C of a loop.
+
+    Args:
+        precision: "float32" or "float64".
+        corners: nodes of an element.
+        ins, inputs: arguments after the cells, and the node that stands for each of their numbers (nodal: c x corners).
+        outs, outputs: results and what they are, likewise.
+    """
+    return _Writer(precision, corners, ins, inputs, outs, outputs).text()
+
+
+class _Writer:
+    def __init__(self, precision, corners, ins, inputs, outs, outputs):
+        self.real, self.f = ("float", "f") if precision == "float32" else ("double", "")
+        self.corners, self.ins, self.inputs, self.outs, self.outputs = corners, ins, inputs, outs, outputs
+        self.batch = any(s.batched for s in ins)
+        self.names: dict[int, str] = {}
+        self.order: list[Node] = []
+        self.used: set[str] = set()
+        self.stored: dict[int, int] = {}
+        self._needed()
+
+    def _needed(self) -> None:
+        """What the results need, each node after its parts."""
+        seen: set[int] = set()
+        stack = [(p, False) for row in reversed(self.outputs) for p in reversed(row)]
+        while stack:
+            node, done = stack.pop()
+            if not isinstance(node, Node) or (id(node) in seen and not done):
+                continue
+            if done:
+                self.order.append(node)
+                continue
+            seen.add(id(node))
+            stack.append((node, True))
+            stack.extend((p, False) for p in reversed(_parts(node)))
+        self.names = {id(n): f"v{i}" for i, n in enumerate(self.order)}
+        if self.batch:
+            for node in self.order:
+                if node.level == BATCH:
+                    self._store(_parts(node))
+            for row in self.outputs:
+                self._store(row)
+
+    def _store(self, parts) -> None:
+        for p in parts:
+            if isinstance(p, Node) and p.level == LANE:
+                self.stored.setdefault(id(p), len(self.stored))
+
+    def say(self, p: Number) -> str:
+        """A number or node as C."""
+        if isinstance(p, Node):
+            return self.names[id(p)]
+        if isinstance(p, bool):
+            return "1" if p else "0"
+        if p != p or p in (float("inf"), -float("inf")):
+            return {True: '(real)__builtin_nan("")'}.get(p != p) or f"({'-' if p < 0 else ''}(real)__builtin_inf())"
+        return f"(real){float(p)!r}" if p >= 0 else f"((real){float(p)!r})"
+
+    def expression(self, node: Node) -> str:
+        """The right-hand side of a node."""
+        op, parts = node.op, node.parts
+        fused = _fused(node)
+        if fused is not None:
+            sign, a, b, minus, c = fused
+            return f"FMA({sign}{self.say(a)}, {self.say(b)}, {minus}{self.say(c)})"
+        said = [self.say(p) for p in parts]
+        if op in SIGN:
+            return f"{said[0]} {SIGN[op]} {said[1]}"
+        if op == "neg":
+            return f"-{said[0]}"
+        if op == "not":
+            return f"!{said[0]}"
+        if op == "select":
+            return f"{said[0]} ? {said[1]} : {said[2]}"
+        if op in ("max", "min"):
+            return (
+                f"({said[0]} {'>' if op == 'max' else '<'} {said[1]} || {said[0]} != {said[0]}) ? {said[0]} : {said[1]}"
+            )
+        if op == "isfinite":
+            return f"({said[0]} - {said[0]}) == 0"
+        if op in ("abs", "sqrt"):
+            return f"__builtin_{'fabs' if op == 'abs' else 'sqrt'}{self.f}({said[0]})"
+        self.used.add(op)
+        return f"{op}{self.f}({', '.join(said)})"
+
+    def statement(self, node: Node) -> str:
+        """One line that defines a node."""
+        kind = "int" if node.truth else "real"
+        return f"const {kind} {self.names[id(node)]} = {self.expression(node)};"
+
+    def text(self) -> str:
+        """The whole program."""
+        body = self._uniform() + self._blocks()
+        declared = []
+        for op in sorted(self.used):
+            two = ", real" if op in TWO else ""
+            declared.append(f"{'SIMD ' if op in VECTOR + OTHER else ''}real {op}{self.f}(real{two});")
+        top = TOP.format(real=self.real, f=self.f, functions="\n".join(declared))
+        head = "void run(const void *const *in, void *const *out, const int64_t E, const int64_t N, const int64_t B) {"
+        return top + "\n".join([head, *("  " + line for line in body), "}"]) + "\n" + HANDLER.format(**self._sizes())
+
+    def _sizes(self) -> dict:
+        batched = next((i for i, s in enumerate(self.ins) if s.batched), None)
+        return {
+            "width": WIDTH, "inputs": len(self.ins) + 1, "outputs": len(self.outs),
+            "nodes": self._nodes(),
+            "batch": "1" if batched is None else f"buffer(frame->args.args[{batched + 1}])->dims[0]",
+        }  # fmt: skip
+
+    def _nodes(self) -> str:
+        for of, slots in (("args.args", self.ins), ("rets.rets", self.outs)):
+            for i, slot in enumerate(slots):
+                if slot.kind == "nodal":
+                    at = f"buffer(frame->{of}[{i + (of == 'args.args')}])"
+                    return f"{at}->dims[{at}->rank - 1]"
+        return "0"
+
+    def _uniform(self) -> list[str]:
+        lines = ["const int32_t *const cells = in[0];"]
+        for i, slot in enumerate(self.ins):
+            lines.append(f"const real *const in{i} = in[{i + 1}];")
+            if slot.kind == "uniform" and not slot.batched:
+                for r, node in enumerate(self.inputs[i]):
+                    if id(node) in self.names:
+                        lines.append(f"const real {self.names[id(node)]} = in{i}[{r}];")
+        lines += [self.statement(n) for n in self.order if n.level == UNIFORM and n.op != "input"]
+        many = "B * " if self.batch else ""
+        for i, slot in enumerate(self.outs):
+            lines.append(f"real *const out{i} = out[{i}];")
+            if slot.kind == "nodal":
+                lines.append(f"for (int64_t i = 0; i < {many}{slot.rows} * N; i++) out{i}[i] = 0;")
+            if slot.kind == "uniform":
+                lines.append(f"for (int64_t i = 0; i < {many}{slot.rows}; i++) out{i}[i] = 0;")
+        return lines
+
+    def _loads(self, batched: bool) -> tuple[list[str], list[str]]:
+        """Lines before and inside a vector loop that bring in its arguments."""
+        before, inside = [], []
+        for i, slot in enumerate(self.ins):
+            if slot.batched != batched or (slot.kind == "uniform" and not batched):
+                continue
+            which = f" + b * {slot.rows}" if batched else ""
+            many = {"nodal": "N", "lane": "E"}.get(slot.kind)
+            start = f"in{i}{which}{f' * {many}' if which and many else ''}"
+            if slot.kind == "nodal":
+                k = self.corners
+                before.append(f"real g{i}[{slot.rows * k}][{WIDTH}];")
+                before.append(f"for (int a = 0; a < {k}; a++)")
+                before.append(f"  for (int i = 0; i < {WIDTH}; i++) {{")
+                before.append("    const int64_t at = cells[a * E + e + i];")
+                before += [f"    g{i}[{c * k} + a][i] = ({start})[{c} * N + at];" for c in range(slot.rows)]
+                before.append("  }")
+            for r, node in enumerate(self.inputs[i]):
+                if id(node) not in self.names:
+                    continue
+                source = {"nodal": f"g{i}[{r}][i]", "lane": f"({start})[{r} * E + e + i]", "uniform": f"({start})[{r}]"}
+                inside.append(f"const real {self.names[id(node)]} = {source[slot.kind]};")
+        return before, inside
+
+    def _blocks(self) -> list[str]:
+        sums = [f"real sum{i}[{s.rows}][{WIDTH}] = {{{{0}}}};" for i, s in enumerate(self.outs) if s.kind == "uniform"]
+        lines = [] if self.batch else sums
+        lines += [f"for (int64_t e = 0; e < E; e += {WIDTH}) {{"]
+        before, inside = self._loads(False)
+        work = [self.statement(n) for n in self.order if n.level == LANE and n.op != "input"]
+        if not self.batch:
+            inner = before + self._vector(inside + work, self._results()) + self._scatter("0")
+            lines += ["  " + x for x in inner] + ["}"]
+            return lines + self._sums("0", False)
+        kept = [f"kept[{at}][i] = {self.names[node]};" for node, at in self.stored.items()]
+        inner = [*before, f"real kept[{max(1, len(self.stored))}][{WIDTH}];"]
+        inner += self._vector(inside + work, kept) if inside + work else []
+        inner.append("for (int64_t b = 0; b < B; b++) {")
+        before, inside = self._loads(True)
+        again = [f"const real {self.names[node]} = kept[{at}][i];" for node, at in self.stored.items()]
+        work = [self.statement(n) for n in self.order if n.level == BATCH and n.op != "input"]
+        part = sums + before + self._vector(again + inside + work, self._results()) + self._scatter("b")
+        part += self._sums("b", True)
+        inner += ["  " + x for x in part] + ["}"]
+        return lines + ["  " + x for x in inner] + ["}"]
+
+    def _vector(self, work: list[str], results: list[str]) -> list[str]:
+        declared = [x for x in results if x.startswith("real ")]
+        stores = [x for x in results if not x.startswith("real ")]
+        head = ["#pragma omp simd", f"for (int i = 0; i < {WIDTH}; i++) {{"]
+        return declared + head + ["  " + x for x in work + stores] + ["}"]
+
+    def _results(self) -> list[str]:
+        lines = []
+        for i, slot in enumerate(self.outs):
+            which = f"b * {slot.rows} * E + " if self.batch else ""
+            if slot.kind == "nodal":
+                lines.append(f"real o{i}[{slot.rows * self.corners}][{WIDTH}];")
+            for r, p in enumerate(self.outputs[i]):
+                said = self.say(p)
+                if slot.kind == "nodal":
+                    lines.append(f"o{i}[{r}][i] = {said};")
+                elif slot.kind == "lane":
+                    lines.append(f"out{i}[{which}{r} * E + e + i] = {said};")
+                else:
+                    lines.append(f"sum{i}[{r}][i] += {said};")
+        return lines
+
+    def _scatter(self, b: str) -> list[str]:
+        lines, k = [], self.corners
+        nodal = [(i, s) for i, s in enumerate(self.outs) if s.kind == "nodal"]
+        if not nodal:
+            return []
+        lines += [f"for (int i = 0; i < {WIDTH}; i++) {{"]
+        lines += [f"  for (int a = 0; a < {k}; a++) {{", "    const int64_t at = cells[a * E + e + i];"]
+        for i, slot in nodal:
+            lines += [f"    out{i}[({b} * {slot.rows} + {c}) * N + at] += o{i}[{c * k} + a][i];"
+                      for c in range(slot.rows)]  # fmt: skip
+        return [*lines, "  }", "}"]
+
+    def _sums(self, b: str, inside: bool) -> list[str]:
+        lines = []
+        for i, slot in enumerate(self.outs):
+            if slot.kind == "uniform":
+                lines.append(f"for (int r = 0; r < {slot.rows}; r++)")
+                lines.append(f"  for (int i = 0; i < {WIDTH}; i++) out{i}[{b} * {slot.rows} + r] += sum{i}[r][i];")
+        return lines
+
+
+def _fused(node: Node):
+    """A sum or difference with a product of the same level, as one fused multiply-add: sign, a, b, sign, c."""
+    if node.op not in ("add", "sub"):
+        return None
+    a, b = node.parts
+    if _product(b, node):
+        return ("-" if node.op == "sub" else "", *b.parts, "", a)
+    if _product(a, node):
+        return ("", *a.parts, "-" if node.op == "sub" else "", b)
+    return None
+
+
+def _product(p: Number, node: Node) -> bool:
+    return isinstance(p, Node) and p.op == "mul" and p.level == node.level
+
+
+def _parts(node: Node) -> tuple[Number, ...]:
+    fused = _fused(node)
+    return node.parts if fused is None else (fused[1], fused[2], fused[4])
+
+
+HANDLER = """
+static XLA_FFI_Buffer *buffer(void *p) {{ return (XLA_FFI_Buffer *)p; }}
+
+/* What XLA calls. */
+XLA_FFI_Error *handler(XLA_FFI_CallFrame *frame) {{
+  if (frame->extension_start && frame->extension_start->type == XLA_FFI_Extension_Metadata) {{
+    XLA_FFI_Metadata *told = ((XLA_FFI_Metadata_Extension *)frame->extension_start)->metadata;
+    told->api_version.major_version = XLA_FFI_API_MAJOR;
+    told->api_version.minor_version = XLA_FFI_API_MINOR;
+    return NULL;
+  }}
+  const void *in[{inputs}];
+  void *out[{outputs}];
+  for (int i = 0; i < {inputs}; i++) in[i] = buffer(frame->args.args[i])->data;
+  for (int i = 0; i < {outputs}; i++) out[i] = buffer(frame->rets.rets[i])->data;
+  const XLA_FFI_Buffer *cells = buffer(frame->args.args[0]);
+  run(in, out, cells->dims[cells->rank - 1], {nodes}, {batch});
+  return NULL;
+}}
+"""

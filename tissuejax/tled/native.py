@@ -1,0 +1,92 @@
+"""The element loop of a scene as compiled C (`lanes/`), where a C compiler is; elsewhere what XLA makes of it stands.
+
+XLA copies between its stages, and each of some 55 operations a block costs a call: the step takes 3 times what a
+hand-written one does, the Jacobian of five parameters ten steps. The same traced formula, written out as C, is within
+a half of the hand-written step, and its five tangents share what does not depend on them (tests/bench). Energies are
+still written once, as energies: the C is made from what JAX traced of the element, derivatives included.
+"""
+
+import dataclasses
+import warnings
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from tissuejax.tled.lanes.library import NotCompiled, compiler
+from tissuejax.tled.lanes.loop import Kernel, run, trace
+from tissuejax.tled.lanes.walk import Untold
+from tissuejax.tled.lanes.write import WIDTH, Slot
+
+if TYPE_CHECKING:
+    from tissuejax.tled.scene import Scene
+
+_kernels: dict[Any, Kernel | None] = {}
+MOST = 200  # kernels that are remembered
+
+
+def loop(by_element: Callable, scene: "Scene", mesh: Any, history: Any) -> Callable | None:
+    """Forces (3, N) and new history of `u` (3, N) and the step, or None where XLA is to do it.
+
+    Args:
+        by_element: `internal.by_element`, of arrays whose last axis counts elements.
+    """
+    count, dtype = len(mesh.stiffness), mesh.stiffness.dtype
+    if compiler() is None or count % WIDTH or dtype not in (jnp.float32, jnp.float64):
+        return None
+    tissue = dataclasses.replace(scene.tissue, stiffness=None, capsule=None)
+    tree = (tissue, scene.settings.hourglass, mesh.reference, mesh.stiffness, history)
+    leaves, structure = jax.tree.flatten(tree)
+    leaves = [jnp.asarray(x) for x in leaves]
+    if any(x.dtype != dtype for x in leaves):
+        return None
+    slots = [_slot(x, count) for x in leaves]
+    key = (structure, tuple(slots), dtype, scene.body.element)
+    if key not in _kernels:
+        if len(_kernels) >= MOST:
+            _kernels.clear()
+        _kernels[key] = _kernel(by_element, scene, mesh, structure, slots, dtype)
+    kernel = _kernels[key]
+    if kernel is None:
+        return None
+
+    def forces(u: Float[Array, "3 N"], step) -> tuple[Float[Array, "3 N"], Any]:
+        out = run(kernel, mesh.cells, [u, jnp.asarray(step, dtype), *leaves], u.shape[-1])
+        return out[0], jax.tree.unflatten(jax.tree.structure(history), out[1:])
+
+    return forces
+
+
+def _slot(x: Array, count: int) -> Slot:
+    return Slot("lane", x.shape[:-1]) if x.ndim and x.shape[-1] == count else Slot("uniform", x.shape)
+
+
+def _kernel(by_element, scene, mesh, structure, slots, dtype) -> Kernel | None:
+    """The kernel, tried out once; None where an operation has no form in C."""
+
+    def one(u, step, *leaves):
+        tissue, hourglass, reference, stiffness, history = jax.tree.unflatten(structure, leaves)
+        settings = dataclasses.replace(scene.settings, hourglass=hourglass)
+        here = dataclasses.replace(scene, tissue=tissue, settings=settings)
+        part = mesh._replace(cells=None, reference=reference, stiffness=stiffness, mass=None, nodal_volume=None)
+        f, history = by_element(here, part, u, history, step)
+        return [jnp.stack(f), *jax.tree.leaves(history)]
+
+    ins = [Slot("nodal", (3,)), Slot("uniform", ()), *slots]
+    outs = ["nodal"] + ["lane"] * (len(jax.eval_shape(one, *_shapes(ins, mesh, dtype))) - 1)
+    try:
+        kernel = trace(one, mesh.cells.shape[0], ins, outs, dtype)
+        kernel.name(str(dtype), (False,) * len(ins))
+    except Untold:
+        return None
+    except NotCompiled as refused:
+        warnings.warn(f"the C compiler refused the element loop, XLA's is taken: {refused}", stacklevel=2)
+        return None
+    return kernel
+
+
+def _shapes(ins, mesh, dtype):
+    last = {"nodal": (mesh.cells.shape[0], 1), "lane": (1,), "uniform": ()}
+    return [jax.ShapeDtypeStruct((*s.shape, *last[s.kind]), dtype) for s in ins]
