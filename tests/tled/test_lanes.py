@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,7 +13,7 @@ import pytest
 from tests.tled import cases
 from tissuejax.mesh.columns import box
 from tissuejax.tled import internal, native
-from tissuejax.tled.history import Prony
+from tissuejax.tled.history import Damage, Prony
 from tissuejax.tled.lanes import library, loop
 
 pytestmark = pytest.mark.skipif(library.compiler() is None, reason="no C compiler here")
@@ -89,3 +90,34 @@ def test_operations_without_a_form_in_c_are_left_to_jax():
 def test_it_can_be_switched_off():
     code = "from tissuejax.tled.lanes import library; assert library.compiler() is None"
     subprocess.run([sys.executable, "-c", code], env=os.environ | {"TISSUEJAX_NATIVE": "off"}, check=True)
+
+
+class More(eqx.Module):
+    """A further energy, amount (I1bar - 3)^2."""
+
+    amount: jax.Array
+
+    def __call__(self, strain):
+        return self.amount * (strain.I1 - 3.0) ** 2
+
+
+MEMORIES = {
+    "prony": {"tissue.prony": Prony(jnp.zeros(2), jnp.array([0.3, 2.0]))},
+    "drain": {"tissue.drain": Prony(jnp.zeros(1), jnp.array([0.3]))},
+    "recoverable": {"tissue.damage": Damage(jnp.asarray(0.0), jnp.asarray(50.0), jnp.asarray(0.0), jnp.asarray(0.1))},
+    "added": {"tissue.added": (More(jnp.asarray(0.0)),)},
+}
+
+
+@pytest.mark.parametrize("name", sorted(MEMORIES))
+def test_a_memory_at_its_neutral_value_changes_no_bit_of_the_forces(name, rng):
+    """No product is fused into a sum and nothing is reordered: what adds zero leaves the rest as it is."""
+    scene = cases.plain(cases.bent(), np.arange(2.0), order=2)
+    u = jnp.asarray(1e-3 * rng.normal(size=(3, len(scene.body.points))))
+
+    def forces(scene):
+        mesh = internal.mesh(scene)
+        found = native.loop(internal.by_element, scene, mesh, internal.rest(scene, mesh))
+        return found(u, 0.1)[0]
+
+    assert np.array_equal(forces(scene), forces(scene.put(MEMORIES[name])))

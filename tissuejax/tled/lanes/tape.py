@@ -1,9 +1,8 @@
-"""One lane of a traced function as straight-line arithmetic: each number once, constants folded, products fused.
+"""One lane of a traced function as straight-line arithmetic: each number once, constants folded.
 
 A function of arrays with a last axis of length one (a lane) is walked operation by operation. An array is a numpy array
-of objects, each a Python number or a `Node`; what only moves numbers about costs nothing, equal operations are one. The
-rules are local, so the same formula gives the same bits wherever it stands: a sum with a product becomes one fused
-multiply-add, and nothing is reordered. So an effect that is neutral to the last bit stays so.
+of objects, each a Python number or a `Node`; what only moves numbers about costs nothing, equal operations are one, and
+nothing is reordered.
 """
 
 import math

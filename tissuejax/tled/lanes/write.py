@@ -2,7 +2,8 @@
 
 Elements are taken in blocks of `WIDTH`, so that what passes from stage to stage stays in the first cache. What does not
 depend on the batch (the tangents of a Jacobian, say) is worked out once for all of it. The C is plain: vectors come
-from the compiler's `omp simd`, and it may neither reorder nor fuse by itself.
+from the compiler's `omp simd`. It may neither reorder nor fuse a product into a sum: then what adds zero changes no bit
+of the rest, whatever stands around it, and an effect at its neutral value is neutral.
 """
 
 from dataclasses import dataclass
@@ -16,11 +17,6 @@ TOP = """#include <stdint.h>
 #include <stddef.h>
 #include "xla/ffi/api/c_api.h"
 typedef {real} real;
-#if defined(__FMA__) || defined(__aarch64__)
-#define FMA(a, b, c) __builtin_fma{f}(a, b, c)
-#else
-#define FMA(a, b, c) ((a) * (b) + (c))
-#endif
 #ifndef SIMD
 #define SIMD
 #endif
@@ -91,12 +87,12 @@ class _Writer:
                 continue
             seen.add(id(node))
             stack.append((node, True))
-            stack.extend((p, False) for p in reversed(_parts(node)))
+            stack.extend((p, False) for p in reversed(node.parts))
         self.names = {id(n): f"v{i}" for i, n in enumerate(self.order)}
         if self.batch:
             for node in self.order:
                 if node.level == BATCH:
-                    self._store(_parts(node))
+                    self._store(node.parts)
             for row in self.outputs:
                 self._store(row)
 
@@ -118,10 +114,6 @@ class _Writer:
     def expression(self, node: Node) -> str:
         """The right-hand side of a node."""
         op, parts = node.op, node.parts
-        fused = _fused(node)
-        if fused is not None:
-            sign, a, b, minus, c = fused
-            return f"FMA({sign}{self.say(a)}, {self.say(b)}, {minus}{self.say(c)})"
         said = [self.say(p) for p in parts]
         if op in SIGN:
             return f"{said[0]} {SIGN[op]} {said[1]}"
@@ -279,27 +271,6 @@ class _Writer:
                 lines.append(f"for (int r = 0; r < {slot.rows}; r++)")
                 lines.append(f"  for (int i = 0; i < {WIDTH}; i++) out{i}[{b} * {slot.rows} + r] += sum{i}[r][i];")
         return lines
-
-
-def _fused(node: Node):
-    """A sum or difference with a product of the same level, as one fused multiply-add: sign, a, b, sign, c."""
-    if node.op not in ("add", "sub"):
-        return None
-    a, b = node.parts
-    if _product(b, node):
-        return ("-" if node.op == "sub" else "", *b.parts, "", a)
-    if _product(a, node):
-        return ("", *a.parts, "-" if node.op == "sub" else "", b)
-    return None
-
-
-def _product(p: Number, node: Node) -> bool:
-    return isinstance(p, Node) and p.op == "mul" and p.level == node.level
-
-
-def _parts(node: Node) -> tuple[Number, ...]:
-    fused = _fused(node)
-    return node.parts if fused is None else (fused[1], fused[2], fused[4])
 
 
 HANDLER = """
