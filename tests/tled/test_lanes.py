@@ -1,9 +1,5 @@
 """The element loop in C computes what JAX computes of the same lane, and so do its derivatives, whatever is in it."""
 
-import os
-import subprocess
-import sys
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -17,6 +13,12 @@ from tissuejax.tled.history import Damage, Prony
 from tissuejax.tled.lanes import library, loop
 
 pytestmark = pytest.mark.skipif(library.compiler() is None, reason="no C compiler here")
+
+
+@pytest.fixture(autouse=True)
+def asked_for(monkeypatch):
+    """The loop in C is on."""
+    monkeypatch.setattr(native, "wanted", lambda: True)
 
 
 @pytest.fixture(scope="module")
@@ -87,9 +89,11 @@ def test_operations_without_a_form_in_c_are_left_to_jax():
     assert np.allclose(s, stiffness**2 * np.asarray(x[0])[np.asarray(cells)].sum(0), rtol=1e-12)
 
 
-def test_it_can_be_switched_off():
-    code = "from tissuejax.tled.lanes import library; assert library.compiler() is None"
-    subprocess.run([sys.executable, "-c", code], env=os.environ | {"TISSUEJAX_NATIVE": "off"}, check=True)
+@pytest.mark.parametrize(("chosen", "wanted"), [("", False), ("off", False), ("on", True)])
+def test_it_is_used_where_it_was_asked_for(monkeypatch, chosen, wanted):
+    monkeypatch.undo()
+    monkeypatch.setenv(library.ENVIRONMENT, chosen)
+    assert native.wanted() is wanted
 
 
 class More(eqx.Module):

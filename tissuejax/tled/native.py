@@ -1,13 +1,14 @@
 """The element loop of a scene as compiled C (`lanes/`), where a C compiler is; elsewhere what XLA makes of it stands.
 
-XLA copies between its stages, and each of some 55 operations a block costs a call: the step took 3.2 to 3.7 times what a
-hand-written one does (tests/bench/yardstick.c). The same traced formula, written out as C, takes 1.6 to 1.9 times as
-much, its element loop alone about 1.3; the tangents of a Jacobian share what does not depend on them. Energies are still
-written once, as energies: the C is made from what JAX traced of the element, derivatives included. That is why it was
-worth some thousand lines; a kernel by hand for each energy would not have been.
+It is off unless TISSUEJAX_NATIVE=on. XLA copies between its stages, and each of some 55 operations a block costs a
+call: the step takes 3.2 to 3.7 times what a hand-written one does (tests/bench/yardstick.c). The same traced formula,
+written out as C, took 1.6 to 1.9 times as much with products fused into sums, which neutral effects do not allow;
+without that it has yet to be timed. The tangents of a Jacobian share what does not depend on them. Energies are still
+written once, as energies: the C is made from what JAX traced of the element, derivatives included.
 """
 
 import dataclasses
+import os
 import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -16,7 +17,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from tissuejax.tled.lanes.library import NotCompiled, compiler
+from tissuejax.tled.lanes.library import ENVIRONMENT, NotCompiled, compiler
 from tissuejax.tled.lanes.loop import Kernel, run, trace
 from tissuejax.tled.lanes.walk import Untold
 from tissuejax.tled.lanes.write import WIDTH, Slot
@@ -28,6 +29,11 @@ _kernels: dict[Any, Kernel | None] = {}
 MOST = 200  # kernels that are remembered
 
 
+def wanted() -> bool:
+    """Whether the loop in C was asked for and a compiler is here."""
+    return os.environ.get(ENVIRONMENT, "").lower() == "on" and compiler() is not None
+
+
 def loop(by_element: Callable, scene: "Scene", mesh: Any, history: Any) -> Callable | None:
     """Forces (3, N) and new history of `u` (3, N) and the step, or None where XLA is to do it.
 
@@ -35,7 +41,7 @@ def loop(by_element: Callable, scene: "Scene", mesh: Any, history: Any) -> Calla
         by_element: `internal.by_element`, of arrays whose last axis counts elements.
     """
     count, dtype = len(mesh.stiffness), mesh.stiffness.dtype
-    if compiler() is None or count % WIDTH or dtype not in (jnp.float32, jnp.float64):
+    if not wanted() or count % WIDTH or dtype not in (jnp.float32, jnp.float64):
         return None
     tissue = dataclasses.replace(scene.tissue, stiffness=None, capsule=None)
     tree = (tissue, scene.settings.hourglass, mesh.reference, mesh.stiffness, history)

@@ -1,6 +1,6 @@
 """A C compiler, where there is one: programs compiled once, kept by the hash of their text, and given to XLA by name.
 
-`TISSUEJAX_NATIVE=off` leaves everything to XLA, as where no compiler is: the same results to rounding, more slowly.
+`TISSUEJAX_NATIVE=on` asks for it. Else, and where no compiler is, all is left to XLA: the same results to rounding.
 """
 
 import ctypes
@@ -34,8 +34,8 @@ class NotCompiled(Exception):
 
 @functools.cache
 def compiler() -> str | None:
-    """The C compiler, or None: none found, or switched off."""
-    if os.environ.get(ENVIRONMENT, "").lower() == "off" or jax.default_backend() != "cpu":
+    """The C compiler; None where none is found or JAX computes elsewhere than on the CPU."""
+    if jax.default_backend() != "cpu":
         return None
     named = os.environ.get("CC")
     return next((found for name in (named, "cc", "gcc", "clang") if name and (found := shutil.which(name))), None)
