@@ -18,7 +18,7 @@ from tissuejax.report.page import figures, plots, write_fit
 from tissuejax.report.residuals import Residuals
 from tissuejax.report.scales import display, with_std
 from tissuejax.report.sensitivities import Directions, Sensitivities
-from tissuejax.report.series import curves
+from tissuejax.report.series import curves, displacements
 from tissuejax.report.sobol_bars import SobolBars
 
 ROOT = __import__("pathlib").Path(__file__).parents[2]
@@ -156,3 +156,21 @@ def test_sobol_indices_of_a_linear_model_are_shares_of_variance(found):
     assert s.first["tension/nominal_stress"][0] == pytest.approx(expected, abs=0.05)
     np.testing.assert_allclose(s.first["tension/nominal_stress"], s.total["tension/nominal_stress"], atol=0.05)
     assert SobolBars().draw(SobolBars().prepare(s)) is not None
+
+
+def test_markers_at_rest_are_shown_at_rest(rng):
+    # Ten markers pushed 1 mm outwards, each its own way, with 0.1 mm of noise: at rest the mean is noise / sqrt(10).
+    way = rng.normal(size=(10, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    amount = np.repeat([0.0, 1.0], 50)
+    clean = rng.normal(size=(10, 3)) + amount[:, None, None] * way
+    noisy = clean + 0.1 * rng.normal(size=clean.shape)
+    shown, told = displacements(noisy, clean)
+    np.testing.assert_allclose(told, amount, atol=1e-12)
+    assert np.std(shown[5:50]) == pytest.approx(0.1 / np.sqrt(10), rel=0.35)
+    assert abs(np.mean(shown[5:50])) < 0.05
+    assert np.mean(shown[50:]) == pytest.approx(1.0, abs=0.05)
+    noisy[20, 3], noisy[30] = np.nan, np.nan
+    again, _ = displacements(noisy, None)
+    assert np.isfinite(again[20])
+    assert np.isnan(again[30])

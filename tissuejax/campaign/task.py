@@ -168,7 +168,8 @@ def limited(seconds: float):
         raise TooLong
 
     before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    # once a second from then on: an exception in a callback of the garbage collector is swallowed
+    signal.setitimer(signal.ITIMER_REAL, seconds, 1.0)
     try:
         yield
     finally:

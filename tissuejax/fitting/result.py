@@ -1,5 +1,6 @@
 """What a fit found: values, uncertainties, errors per channel, warnings in sentences; and its record as JSON."""
 
+import functools
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -206,12 +207,18 @@ def described(model: Model) -> dict:
 
 def versions() -> dict[str, str]:
     """Versions that a number may depend on; "source" is the hash of this package's code as it was loaded."""
+    float_name = str(jax.dtypes.canonicalize_dtype(float))
+    return {"python": platform.python_version(), "float": float_name} | _installed() | {"source": source.LOADED}
+
+
+@functools.cache
+def _installed() -> dict[str, str]:
+    """Read once: parsing the metadata costs as much as a small fit."""
     names = ("tissuejax", "jax", "optimistix", "optax", "diffrax", "numpy", "scipy")
-    found = {"python": platform.python_version(), "float": str(jax.dtypes.canonicalize_dtype(float))}
+    found = {}
     for name in names:
         try:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             found[name] = "not installed"
-    found["source"] = source.LOADED
     return found

@@ -119,7 +119,7 @@ def _inline(table: dict) -> str:
 
 
 def _commented(line: str, comment: str) -> str:
-    return f"{line.ljust(_WIDTH)}# {comment}" if comment else line
+    return f"{line.ljust(_WIDTH - 1)} # {comment}" if comment else line
 
 
 _TIME = 'time = { column = "time", unit = "s" }'

@@ -57,7 +57,7 @@ class Curve:
 
 
 def curves_of(recording: Recording, prediction: Recording | None = None, std=None, held: bool = False) -> list[Curve]:
-    """All scalar series of a recording; marker clouds (three axes) as the mean distance from their first position."""
+    """All scalar series of a recording; clouds of markers as their mean displacement, each along its own way."""
     found = []
     for name, channel in recording.channels.items():
         other = prediction.channels.get(name) if prediction is not None else None
@@ -65,6 +65,13 @@ def curves_of(recording: Recording, prediction: Recording | None = None, std=Non
         predicted = None if other is None else np.asarray(other.values, float)
         level = (std or {}).get(f"{recording.name}/{name}", channel.noise_std)
         drive_name, drive = _drive(recording, channel)
+        if measured.ndim == 3:
+            shown, told = displacements(measured, predicted)
+            level = None if level is None else level / np.sqrt(measured.shape[1])
+            time = np.asarray(channel.time, float)
+            label = components(name, measured)[0][1]
+            found.append(Curve(recording.name, label, time, None, "", shown, told, channel.unit, level, held))
+            continue
         for k, label in components(name, measured):
             own = drive[:, k] if drive is not None and drive.ndim == 2 and measured.ndim == 2 else drive
             own = None if own is None or own.ndim != 1 else own
@@ -75,8 +82,8 @@ def curves_of(recording: Recording, prediction: Recording | None = None, std=Non
                     np.asarray(channel.time, float),
                     own,
                     drive_name,
-                    _pick(measured, k, measured),
-                    None if predicted is None else _pick(predicted, k, measured),
+                    measured if measured.ndim == 1 else measured[:, k],
+                    predicted if predicted is None or predicted.ndim == 1 else predicted[:, k],
                     channel.unit,
                     level,
                     held,
@@ -110,21 +117,33 @@ def components(name: str, values: np.ndarray) -> list[tuple[int, str]]:
     if values.ndim == 2:
         axes = AXES.get(name, "0123456789")
         return [(k, f"{name} {axes[k] if k < len(axes) else k}") for k in range(values.shape[1])]
-    return [(0, f"{name} (mean displacement)" if values.ndim == 3 else name)]
+    return [(0, "marker displacement" if values.ndim == 3 else name)]
 
 
-def _pick(values: np.ndarray, k: int, reference: np.ndarray) -> np.ndarray:
-    if values.ndim == 2:
-        return values[:, k]
-    if values.ndim == 3:
-        start = np.array(
-            [
-                column[np.isfinite(column)][0] if np.isfinite(column).any() else 0.0
-                for column in reference.reshape(len(reference), -1).T
-            ]
-        ).reshape(reference.shape[1:])
-        lost = ~np.isfinite(reference).all(-1)
-        moved = np.where(lost, np.nan, np.linalg.norm(values - start, axis=-1))
-        counts = np.maximum((~lost).sum(1), 1)
-        return np.where(lost.all(1), np.nan, np.nansum(moved, 1) / counts)
-    return values
+def displacements(
+    measured: Float[np.ndarray, "n m 3"], predicted: Float[np.ndarray, "n m 3"] | None
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"] | None]:
+    """Mean over the markers of how far each has gone along its own way: the direction in which it is farthest out.
+
+    Unlike a mean of distances this is zero, but for noise, while nothing moves. The way is the prediction's where there
+    is one; each series starts from its own rest (the measured one from the median of its first frames).
+    """
+    guide = measured if predicted is None else predicted
+    out = guide - _rest(guide)
+    far = int(np.argmax(np.nansum(np.linalg.norm(out, axis=-1), axis=1)))
+    near = out[max(0, far - 2) : far + 3]
+    way = np.nanmean(near, axis=0)
+    way = way / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-300)
+    told = None if predicted is None else np.nanmean(np.einsum("nmi,mi->nm", out, way), axis=1)
+    shown = np.einsum("nmi,mi->nm", measured - _rest(measured), way)
+    lost = ~np.isfinite(shown).any(1)
+    return np.where(lost, np.nan, np.nanmean(np.where(lost[:, None], 0.0, shown), axis=1)), told
+
+
+def _rest(places: np.ndarray) -> np.ndarray:
+    """Where each marker was first seen: the median of its first five frames."""
+    seen = np.full(places.shape[1:], 0.0)
+    for j in range(places.shape[1]):
+        known = places[np.isfinite(places[:, j]).all(1), j]
+        seen[j] = np.median(known[:5], axis=0) if len(known) else np.nan
+    return seen
