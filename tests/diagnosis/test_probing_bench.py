@@ -8,17 +8,13 @@ import pytest
 from tests.probing.bench import VALUES, measured, recording, sample
 from tissuejax.cache import source
 from tissuejax.diagnosis import probing_free
-from tissuejax.diagnosis.diagnose import PROBING
-from tissuejax.diagnosis.judgement.answer import answer
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_runs import COARSE, FINE
-from tissuejax.diagnosis.probing_view import REMAINS, ProbingView, probing_blocks, probing_discrepancy
+from tissuejax.diagnosis.probing_view import REMAINS, ProbingView
 from tissuejax.diagnosis.refit import refit
-from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.energies.catalogue import energy
 from tissuejax.recordings.recording import Sample
-from tissuejax.report.diagnosis_page import write_diagnosis
 
 QUICK = {"counts": (12, 12, 5), "core": 0.007, "compression": 1.5, "interval": 0.04, "step": 4e-4, "processes": 1}
 TWO = sample(recording("a"), recording("b", place=(-0.004, 0.004), depth=2.5e-3))
@@ -174,24 +170,3 @@ def test_a_stopped_diagnosis_finds_its_runs_again(pressed_too_deep, tmp_path, mo
         assert not again.runs._path(key).exists()
     again.runs.forget()
     assert not (tmp_path / "runs").exists()
-
-
-@pytest.mark.slow
-def test_a_probe_that_is_too_low_is_named_by_the_judgement(pressed_too_deep, tmp_path):
-    """From recordings to a page: the shifted probe is weighed beside friction, and named."""
-    tried = ("contact-offset", "friction")
-    whole = ProbingBench.of(pressed_too_deep, energy("reduced-polynomial-2"), ("a", "b"), (), names=tried, **QUICK)
-    narrow = whole.narrowed(("a",), ("b",), tried)
-    for b in (whole, narrow):
-        b.candidates = {k: c for k, c in b.candidates.items() if k in ("contact-offset/depth", "friction")}
-    view = ProbingView.of(whole)
-    cut = probing_blocks(view)
-    effort = replace(PROBING, most=1, reshaped=(0, 0))
-    found = answer(ProbingView.of(narrow), view, cut, probing_discrepancy(view, cut), effort)
-    assert found.judgement.names == ("contact-offset",)
-    depth = found.chosen.values["effects.contact-offset.depth"]
-    assert depth == pytest.approx(DEPTH, abs=4 * found.chosen.std["effects.contact-offset.depth"])
-    assert 0 < found.evidence.sets[0].numerical < 0.05
-    made = Diagnosis("pressed too deep", "reduced-polynomial-2", found, 1.0)
-    page = write_diagnosis(made, tmp_path)["page"].read_text()
-    assert "mesh and step" in page
