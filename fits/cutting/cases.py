@@ -158,7 +158,7 @@ NAMES = ("faces.values.strength", "faces.values.energy", "probe.friction", "prob
 def derivatives() -> dict:
     """Derivatives of a cut's force record by four parameters: forward, reverse, and central differences."""
     scene = cut(h=1e-3, bulk=2e4, travel=0.014, frames=40, strength=3000.0, friction=0.1)
-    at = jnp.array([3000.0, 2.0, 0.1, 2e-4])
+    at = jnp.array([3000.0, 2.0, 0.1, float(scene.probe.shape.rounding)])
 
     def record(x):
         return simulate(scene.put(dict(zip(NAMES, x, strict=True)))).force[:, 0] * 1e3
@@ -209,3 +209,29 @@ def cost() -> dict:
     bare = out["bare_us_a_step"]
     out |= {f"{k}_percent": 100 * (out[f"{k}_us_a_step"] / bare - 1) for k in ("faces", "blade", "friction")}
     return out
+
+
+def recovery() -> dict:
+    """Strength, toughness and friction from 50 % off, 3 % noise, a record from a mesh twice as fine; then the same
+    behind a notch as long as the entry."""
+    from tests.cutting.records import TRUTH, model, simulated
+    from tissuejax.fitting.cut import ENERGY, FRICTION, STRENGTH, fit_cut
+
+    known = {k: v for k, v in TRUTH.items() if k.startswith(("energy", "volumetric"))}
+    start = {STRENGTH: 1.5 * TRUTH[STRENGTH], ENERGY: 1.5 * TRUTH[ENERGY], FRICTION: 1.5 * TRUTH[FRICTION]}
+    out = []
+    for what, notch in (("entry included", None), ("entry left out", 6e-3)):
+        seen = simulated(5e-4, 0.03, notch=notch)
+        begun, cpu = time.perf_counter(), time.process_time()
+        found = fit_cut(seen, model(), known, start)
+        row = {"what": what, "status": found.status, "runs": found.runs, "chi2_per_sample": found.chi2_per_sample,
+               "wall_s": time.perf_counter() - begun, "cpu_s": time.process_time() - cpu}  # fmt: skip
+        for name, path in (("strength", STRENGTH), ("energy", ENERGY), ("friction", FRICTION)):
+            row |= {name: found.values[path], f"{name}_std": found.std[path],
+                    f"{name}_percent": 100 * (found.values[path] / TRUTH[path] - 1)}  # fmt: skip
+        measured = found.predictor.sample.recordings["r"].channels["cutting_force"]
+        made = found.predicted["r"].channels["cutting_force"]
+        row |= {"unidentified": found.unidentified, "record": [np.asarray(x).tolist() for x in
+                (measured.time, measured.values, made.values)]}  # fmt: skip
+        out.append(row)
+    return {"runs": out}

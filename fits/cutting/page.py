@@ -2,14 +2,22 @@
 
 from pathlib import Path
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from tissuejax.report.page import png, render
 from tissuejax.storage import write_bytes, write_text
 
 
+def _kept(folder: Path, name: str, caption: str, figure: Figure) -> dict:
+    picture = png(figure)
+    (folder / "figures").mkdir(exist_ok=True)
+    write_bytes(folder / "figures" / f"{name}.png", picture)
+    return {"name": name, "caption": caption, "png": picture}
+
+
 def write(folder: Path, found: dict) -> Path:
-    """report.html and figures/force.png from result.json."""
+    """report.html and the figures from result.json."""
     tables = []
     for name, part in found.items():
         runs = part.get("runs") if isinstance(part, dict) else None
@@ -23,6 +31,16 @@ def write(folder: Path, found: dict) -> Path:
             columns = ["parameter and relative step", "derivative against central difference"]
             tables.append({"title": "derivatives, step by step", "columns": columns, "rows": rows})
     shown = []
+    if "recovery" in found:
+        runs = found["recovery"]["runs"]
+        figure = Figure(figsize=(8, 2.8 * len(runs)), layout="constrained")
+        for ax, r in zip(np.atleast_1d(figure.subplots(len(runs), 1)), runs, strict=True):
+            at, seen, made = r["record"]
+            ax.plot(at, seen, ".", color="0.5", markersize=3, label="record (mesh twice as fine, noise), smoothed")
+            ax.plot(at, made, linewidth=1.4, label="fitted")
+            ax.set(xlabel="time (s)", ylabel="force (N)", title=r["what"])
+            ax.legend(frameon=False, fontsize=8)
+        shown += [_kept(folder, "recovery", "A record of a mesh twice as fine, fitted from 50 % off.", figure)]
     if any("series" in r for r in found.get("steady", {}).get("runs", [])):
         figure = Figure(figsize=(8, 3.2), layout="constrained")
         ax = figure.subplots()
@@ -31,9 +49,6 @@ def write(folder: Path, found: dict) -> Path:
         ax.axhline(found["steady"]["runs"][0]["expected_N_m"], color="k", linewidth=0.8, linestyle="--")
         ax.set(xlabel="travel of the blade (mm)", ylabel="force per depth (N/m)")
         ax.legend(frameon=False, fontsize=8)
-        picture = png(figure)
-        (folder / "figures").mkdir(exist_ok=True)
-        write_bytes(folder / "figures" / "force.png", picture)
-        shown = [{"name": "force", "caption": "Force on the blade; dashed: closed form.", "png": picture}]
+        shown += [_kept(folder, "force", "Force on the blade; dashed: closed form.", figure)]
     page = render("cutting.html.j2", title="Is the cutting simulation right?", tables=tables, figures=shown)
     return write_text(folder / "report.html", page)

@@ -25,8 +25,8 @@ def test_the_grid_does_not_show_beside_the_noise():
 
 
 def test_steady_force_is_toughness_plus_the_squeezed_layers():
-    """By virtual work: G + 2 (k v^2/2 + k c v^3 / 3 W), v half the thickness (the penetration is below a per cent), less
-    what an exponential law has not lost at an opening of one thickness, G (1 + r) exp(-r), r = b e tau / G."""
+    """By virtual work: G + 2 (k v^2/2 + k c v^3 / 3 W), v half the thickness (penetration below a per cent), less what
+    an exponential law has not lost at an opening of one thickness, G (1 + r) exp(-r), r = b e tau / G."""
     force = cut(6e-4, part=2.3)
     k, half, r = SLAB.wave / SLAB.half, 3e-4, 2.3 * np.e
     layers = k * half**2 + 2 * k * SLAB.hardening * half**3 / (3 * SLAB.half)

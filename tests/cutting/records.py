@@ -1,10 +1,13 @@
-"""Cutting recordings for tests, by algebra: what the balance of energies says, or any force given."""
+"""Cutting recordings for tests: any force given, or that of a simulation on a finer mesh with noise."""
 
 import numpy as np
 
 from tissuejax.cohesion.catalogue import law
+from tissuejax.effects.catalogue import effect
 from tissuejax.energies.neo_hookean import NeoHookean
 from tissuejax.energies.volumetric import Quadratic
+from tissuejax.experiments.cutting_run import CuttingSettings
+from tissuejax.experiments.predictor import predictor
 from tissuejax.mesh.slab import across, block
 from tissuejax.model import Model
 from tissuejax.recordings.recording import Channel, Recording, Sample
@@ -42,3 +45,29 @@ def sample(*recordings, length=0.03, half=0.01) -> Sample:
     """A block, 10 mm high, with these recordings."""
     body = block(np.linspace(0, length, 7), across(half, 5e-3), np.linspace(0, 0.01, 3), "base")
     return Sample("block", {r.name: r for r in recordings}, body, 1000.0)
+
+
+TRUTH = {
+    "energy.mu": 3000.0, "volumetric.K": 3.6e4, "cohesion.strength": 3000.0, "cohesion.energy": 2.0,
+    "effects.blade-friction.coefficient": 0.1,
+}  # fmt: skip
+
+
+def simulated(h, noise, seed=3, notch=None) -> Sample:
+    """A blade of 2 mm drawn 14 mm into a slab and half the way back, with friction: forces of a simulation with
+    elements of size `h` (m), and noise of `noise` times the greatest force."""
+    time, x = strokes(-0.001, 0.014, 0.008, rate=40.0)
+    more = {} if notch is None else {"notch": notch}
+
+    def made(force, std):
+        return sample(
+            record("r", time, x, force, thickness=2e-3, noise=std, **more), length=0.02, half=0.005
+        )  # fmt: skip
+
+    p = predictor(
+        model(effect("blade-friction")), made(0 * x + 0.1, 1e-3), by="simulation", settings=CuttingSettings(h=h),
+        start=TRUTH,
+    )  # fmt: skip
+    force = np.asarray(p.predict(TRUTH)["r"].channels["cutting_force"].values)
+    std = noise * float(force.max())
+    return made(force + std * np.random.default_rng(seed).standard_normal(len(force)), std)

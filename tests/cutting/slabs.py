@@ -16,7 +16,7 @@ MU, BULK = 1564.0, 2600.0
 
 def cut(
     length=0.02, half=0.005, h=1e-3, travel=0.014, frames=40, strength=4000.0, energy=2.0, bulk=BULK, friction=None,
-    thickness=2e-3, rounding=2e-4, speed=0.05, name="bilinear", damping=20.0, notched=0.0, **joint,
+    thickness=2e-3, rounding=None, speed=0.05, name="bilinear", damping=20.0, notched=0.0, **joint,
 ):  # fmt: skip
     """A wedge of 30 degrees driven into a slab from its edge."""
     made = plane_slice(length, half, h)
@@ -30,7 +30,8 @@ def cut(
     middle = np.asarray(made.geometry.points)[made.minus].mean(1)[:, 0]
     joint |= {"notch": (middle < notched).astype(float)} if notched else {}
     scene = seam.joined(scene, made, law(name), {"strength": strength, "energy": energy}, **joint)
-    wedge = Wedge(thickness, np.tan(np.radians(15)), rounding)
+    slope = float(np.tan(np.radians(15)))
+    wedge = Wedge(thickness, slope, seam.shoulder(thickness, slope, h) if rounding is None else rounding)
     tip = np.array([[-2e-3, 0, 0], [-2e-3 + travel, 0, 0]])
     return seam.armed(scene, made, wedge, np.array([0, end]), tip, friction=friction)
 

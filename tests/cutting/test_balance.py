@@ -37,9 +37,14 @@ def test_steady_cut_return_and_second_pass():
     first = np.argmax(X > 0.02)
     back = first + np.argmax(X[first:] >= 0.0249) + 50
     again = len(X) - 100
-    assert at[first] == pytest.approx(0.01 * (5.0 + wedge + rub * X[first]), rel=1e-3)
-    assert at[back] == pytest.approx(0.01 * (wedge - rub * X[back]), rel=1e-3)
-    assert at[again] == pytest.approx(0.01 * (wedge + rub * X[again]), rel=1e-3)
+    # normal forces N on the bevels do the work across: 2 N (cos a -+ 0.1 sin a) tan a = G + wedge, a = 15 degrees
+    a = np.radians(15)
+    going, coming = (
+        (np.sin(a) + m * np.cos(a)) / (np.cos(a) - m * np.sin(a)) / np.tan(a) for m in (0.1, -0.1)
+    )  # fmt: skip
+    assert at[first] == pytest.approx(0.01 * ((5.0 + wedge) * going + rub * X[first]), rel=1e-3)
+    assert at[back] == pytest.approx(0.01 * (wedge * coming - rub * X[back]), rel=1e-3)
+    assert at[again] == pytest.approx(0.01 * (wedge * going + rub * X[again]), rel=1e-3)
     assert at[0] == 0
 
 

@@ -3,9 +3,11 @@
 In the steady state the blade's work goes into parting (toughness G), into the two layers that it leaves squeezed behind
 it, and into friction on its flats. Per depth of cut,
 
-    F = G + 2 W psi(1 - b / 2W) + 2 mu p L,
+    F = (G + 2 W psi(1 - b / 2W)) (1 + mu / t) / (1 - mu t) + 2 mu p L,
 
-psi the strain energy of a layer of height W (half the tissue's width) pressed together by half the thickness b, p
+t the slope of a bevel (what parts and squeezes the tissue presses on the bevels, and rubs there: 2 N (cos - mu sin) t
+is the work across the cut, 2 N (sin + mu cos) the force along it; at 14 degrees and mu 0.1 they add 44 %), psi the
+strain energy of a layer of height W (half the tissue's width) pressed together by half the thickness b, p
 its pressure, L the length of blade in contact (all that is cut, or `reach`). On the way back, and in a cut made before,
 only friction is left. This is exact for any law of parting and any strain (virtual work), and holds no strength: that
 is in the entry, which only the simulation has (`cutting_run.py`); here the force sets in over a length.
@@ -87,4 +89,6 @@ def balance_force(model: Model, values: Mapping[str, Array], path: Path) -> Floa
     parting = path.fresh * cut.energy * fresh + wedge * inside
     contact = jnp.clip(jnp.asarray(path.x), 0, path.length)
     way = jnp.tanh(jnp.asarray(path.speed) / 1e-4)  # at rest the springs of friction hold what they held
-    return cut.depth * (parting + 2 * cut.friction * pressure * contact * way)
+    slope, rub = jnp.tan(0.5 * path.angle), cut.friction * way
+    bevel = (1 + rub / slope) / (1 - rub * slope)
+    return cut.depth * (parting * bevel + 2 * rub * pressure * contact)

@@ -31,6 +31,7 @@ from tissuejax.tled.simulate import simulate
 
 SPEED = 0.05  # m/s
 FEWEST = 8
+CALM = 0.25  # friction excites that mode, the more the longer the blade is in contact; at 0.04 it grows
 
 
 @dataclass(frozen=True)
@@ -42,15 +43,16 @@ class CuttingSettings:
             it.
         growth: of elements away from the path, from one to the next.
         reach: of the path that is simulated, m; the whole by default.
-        rounding: of the blade's shoulder, in its thickness. damping: mass damping, 1/s.
+        rounding: radius of the shoulder, m; None: what elements of this size can feel (`seam.shoulder`).
+        damping: mass damping, 1/s; None: `CALM` of the lowest shear frequency of a half, pi/2 c_s / W.
         strongest: strength that the faces' stiffness must allow, over the start's.
     """
 
     h: float | None = None
     growth: float = 1.25
     reach: float | None = None
-    rounding: float = 0.2
-    damping: float = 20.0
+    rounding: float | None = None
+    damping: float | None = None
     strongest: float = 3.0
 
     def finer(self, path: Path, factor: float = 2.0) -> "CuttingSettings":
@@ -59,7 +61,7 @@ class CuttingSettings:
 
 
 class Slice(NamedTuple):
-    """A scene made ready for many values, and the stations of its faces."""
+    """A scene made ready for many values, the stations of its faces, and the way that the blade goes in each frame."""
 
     scene: Scene
     at: Float[np.ndarray, " P"]
@@ -68,6 +70,7 @@ class Slice(NamedTuple):
     width: float
     pathtime: Float[np.ndarray, " n"]
     runtime: Float[np.ndarray, " n"]
+    heading: Float[np.ndarray, " m"]
 
 
 class Ran(eqx.Module):
@@ -107,17 +110,22 @@ def prepare(model: Model, values: Mapping[str, float], density: float, path: Pat
     runtime, end = way / SPEED, way[-1] / SPEED
     frames = max(20, int(np.ceil(way[-1] / (0.5 * h))))
     times = (np.arange(frames) + 0.5) * end / frames
+    damping = settings.damping
+    if damping is None:
+        shear = float(model.energy.initial_shear_modulus(under("energy", values)))
+        damping = CALM * 0.5 * np.pi * np.sqrt(shear / density) / path.half
     scene = build.scene(
         made.geometry, model.energy, model.volumetric, under("energy", values), under("volumetric", values), density,
         times, held=slice_held(np.asarray(made.geometry.points), path.half), joined=seam.pairs(made),
-        mass_damping=settings.damping, hourglass=seam.HOURGLASS,
+        mass_damping=damping, hourglass=seam.HOURGLASS,
     )  # fmt: skip
     middle = np.asarray(made.geometry.points)[made.minus].mean(1)[:, 0]
     cohesive = under("cohesion", values)
     strong = cohesive | {"strength": cohesive["strength"] * settings.strongest}
     faces = len(middle)
     scene = seam.joined(scene, made, law, strong, notch=(middle < path.notch).astype(float))
-    blade = Wedge(path.thickness, np.tan(path.angle / 2), settings.rounding * path.thickness)
+    slope = float(np.tan(path.angle / 2))
+    blade = Wedge(path.thickness, slope, settings.rounding or seam.shoulder(path.thickness, slope, h))
     tip = np.stack([x[keep], np.zeros(keep.sum()), np.zeros(keep.sum())], 1)
     scene = seam.armed(scene, made, blade, runtime[keep], tip, friction=0.0)
     spread = {k: jnp.full(faces, float(v)) for k, v in cohesive.items()}
@@ -126,7 +134,8 @@ def prepare(model: Model, values: Mapping[str, float], density: float, path: Pat
     first = np.searchsorted(passing, middle).clip(0, len(path.x) - 1)
     begun = path.time[int((path.x > 0).argmax())]
     clock = np.interp(path.time, path.time[:last], runtime)
-    return Slice(scene, middle, path.speed[first], path.time[first] - begun, h, path.time, clock)
+    heading = np.sign(np.diff(np.interp(SPEED * end * np.arange(frames + 1) / frames, way, x)))
+    return Slice(scene, middle, path.speed[first], path.time[first] - begun, h, path.time, clock, heading)
 
 
 def run_slice(model: Model, values: Mapping[str, Array], ready: Slice, path: Path) -> Ran:
@@ -148,7 +157,10 @@ def run_slice(model: Model, values: Mapping[str, Array], ready: Slice, path: Pat
             scene = scene.put({"tissue.added": (*scene.tissue.added, Added(effect, p))})
         scene = effect.scene(p, None, scene)
     out = simulate(scene)
-    at = jnp.interp(jnp.asarray(ready.runtime), out.time, -out.force[:, 0] / ready.width)
+    # what mass damping took is none of a slow cut's: there is nothing to shake there
+    shaken = jnp.diff(out.balance.damping, prepend=0.0) / (SPEED * scene.clock.interval)
+    force = (-out.force[:, 0] - jnp.asarray(ready.heading) * shaken) / ready.width
+    at = jnp.interp(jnp.asarray(ready.runtime), out.time, force)
     deep = met(model, values, path, path.front, path.speed, path.time - path.time[0], path.depth).depth
     work = jnp.abs(out.balance.work)
     late = work > 0.05 * work[-1]

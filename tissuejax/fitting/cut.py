@@ -6,6 +6,7 @@ stroke or a second pass. The ripple of the mesh (one element's period) is no par
 after a Gaussian of that width. The step between two meshes is added to the standard errors.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -16,6 +17,7 @@ from jaxtyping import Float
 
 from tissuejax.effects.catalogue import effect
 from tissuejax.errors import InputError
+from tissuejax.experiments.cutting import layer
 from tissuejax.experiments.cutting_predictor import CuttingPredictor
 from tissuejax.experiments.cutting_record import FORCE, drawn
 from tissuejax.experiments.cutting_run import CuttingSettings, element_size
@@ -27,6 +29,7 @@ from tissuejax.model import Model
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 STRENGTH, ENERGY, FRICTION = "cohesion.strength", "cohesion.energy", "effects.blade-friction.coefficient"
+ONSET = "effects.onset.longer"
 OPEN = np.log(2) / 2 / 1.96  # relative standard error from which an interval spans a factor of two
 COARSER = 1.5
 
@@ -80,7 +83,7 @@ def smoothed(sample: Sample, widths: Mapping[str, float]) -> Sample:
             seen = r.channels[FORCE]
             spacing = float(np.median(np.diff(seen.time)))
             sigma = widths[name] / spacing
-            quiet = 1 / np.sqrt(max(1.0, 2 * np.sqrt(np.pi) * sigma))
+            quiet = 1 / math.sqrt(max(1.0, 2 * math.sqrt(math.pi) * sigma))
             values = (
                 gaussian_filter1d(np.asarray(seen.values, float), sigma, mode="nearest") if sigma > 0.3 else seen.values
             )
@@ -131,7 +134,7 @@ def fit_cut(
     values = first.values
     if by == "balance":
         return first
-    values = values | dict(start or {})
+    values = values | _linear(first.predictor, values, known) | dict(start or {})
     if STRENGTH not in (start or {}) and STRENGTH not in known:  # a face that parts at half the blade's thickness
         thickness = min(p.thickness for p in first.predictor.paths_of.values())
         values[STRENGTH] = 4 * values[ENERGY] / thickness
@@ -146,7 +149,7 @@ def fit_cut(
     posed = problem(
         predictor(plain, seen, names, by="simulation", settings=settings, start=values, lenient=True),
         free=free, start=values,
-        bounds={STRENGTH: (0.1 * values[STRENGTH], top), ENERGY: (0.3 * values[ENERGY], 3 * values[ENERGY])},
+        bounds={STRENGTH: (0.1 * values[STRENGTH], top), ENERGY: (0.05 * values[ENERGY], 20 * values[ENERGY])},
     )  # fmt: skip
     ended = descend(posed, values, max_steps=max_steps, tolerance=1e-4)
     found = posed.values(ended.y)
@@ -174,7 +177,7 @@ def fit_cut(
 
 def _by_balance(sample, model, known, names, start):
     with_onset = model.with_effects(effect("onset"))
-    free = [p for p in (ENERGY, FRICTION, "effects.onset.longer") if p not in known]
+    free = [p for p in (ENERGY, FRICTION, ONSET) if p not in known]
     values = with_onset.defaults | dict(known) | {k: v for k, v in start.items() if k in with_onset.parameters}
     p = predictor(with_onset, sample, names)
     if ENERGY not in known:  # the mean of what cuts fresh tissue, over the depth
@@ -196,9 +199,45 @@ def _by_balance(sample, model, known, names, start):
     spread = uncertainty(J, ended.y, scale, tuple(free), tuple(declared[q].unit for q in free), widening)
     std = dict(zip(free, spread.std.tolist(), strict=True))
     why = {STRENGTH: "the balance of energies holds no strength; fit by simulation"}
+    if ONSET in free and found[ONSET] > 0.98 * p.model.declared[ONSET].upper:
+        why[ENERGY] = "the force is still setting in where the record ends: a longer cut, or a simulation, tells it"
     status, chi2 = "converged" if ended.converged else ended.reason, float(r @ r / len(r))
     none = dict.fromkeys(free, 0.0)
     return CutFit(found, std, none, why, chi2, status, ended.n_evaluations, "balance", p, p.predict(found), 0.0)
+
+
+def _linear(p: CuttingPredictor, values, known) -> dict[str, float]:
+    """Toughness and friction to begin a simulation with, where the blade is in by more than its bevel.
+
+    F / depth = (G + wedging) k + friction on the flats is linear in G k and the friction, k that of the bevels. An
+    onset that is fitted along can take up all of a short record.
+    """
+    rows, right = [], []
+    for name, path in p.paths_of.items():
+        seen = p.sample.recordings[name].channels[FORCE]
+        wedge, pressure = (float(q) for q in layer(p.model.across(()), values, path.half, path.thickness))
+        bevel = 0.5 * path.thickness / np.tan(path.angle / 2)
+        used = (path.x > bevel) & (path.x < path.length - bevel) & (path.depth > 0) & (np.abs(path.speed) > 1e-6)
+        time = np.asarray(seen.time, float)
+        kept = np.interp(time, path.time, used) > 0.99
+        force, depth, x, fresh, speed = (
+            np.interp(time, path.time, q)[kept] if q is not None else np.asarray(seen.values, float)[kept]
+            for q in (None, path.depth, path.x, path.fresh, path.speed)
+        )
+        rows.append(np.stack([fresh, 2 * pressure * x * np.sign(speed)], 1))
+        right.append(force / depth - wedge)
+    A, b = np.concatenate(rows), np.concatenate(right)
+    out = {}
+    if FRICTION in known:
+        A, b = A[:, :1], b - A[:, 1] * known[FRICTION]
+    if len(b) > 5:
+        found = np.linalg.lstsq(A, b, rcond=None)[0]
+        least = 0.02 * float(np.max(np.abs(b)))  # a start is positive, whatever a short record says
+        rub = known.get(FRICTION, max(float(found[-1]), 0.01))
+        slopes = [np.tan(0.5 * path.angle) for path in p.paths_of.values()]
+        bevel = float(np.mean([(1 + rub / t) / (1 - rub * t) for t in slopes]))
+        out = {ENERGY: max(float(found[0]) / bevel, least), FRICTION: rub}
+    return {k: v for k, v in out.items() if k not in known}
 
 
 def _unidentified(p, values, std, free, at_bound) -> dict[str, str]:

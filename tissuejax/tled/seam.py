@@ -18,6 +18,7 @@ from jaxtyping import Float
 
 from tissuejax.cohesion.law import Law
 from tissuejax.errors import InputError
+from tissuejax.mesh.facets import area_vectors, boundary
 from tissuejax.mesh.split import Split
 from tissuejax.tled import build
 from tissuejax.tled.blade import Wedge
@@ -27,6 +28,9 @@ from tissuejax.tled.shapes import Shape
 from tissuejax.tled.stable import wave_modulus
 
 STIFF, LAW = 11.0, 4.0
+LIPS = 1.5  # surface beside the cut that may touch the blade, in its thickness
+UPRIGHT = 0.7  # a lip's normal goes along the cut (x, as the blade's) by at least this share
+ARC, SHARP = 4.0, 0.2  # radius of a shoulder in facets, and at least in thicknesses
 PRESSED = 50.0  # penalty in M / W
 HOURGLASS = 1.0  # in shear moduli: at 0.3 the corner where a blade enters soft tissue folds over in hourglass modes
 
@@ -119,7 +123,8 @@ def armed(
     penalty: float | None = None,
     friction: float | None = None,
 ) -> Scene:
-    """The scene with a blade that follows `tip` (m, at real `time`); its patch are the faces of the cut, both sides.
+    """The scene with a blade that follows `tip` (m, at real `time`); its patch are the faces of the cut, both
+    sides, and the lips where it goes in and out.
 
     Raises:
         InputError: a blade that starts inside the tissue, a bevel that is not between 0 and 90 degrees, a shoulder
@@ -132,8 +137,9 @@ def armed(
         if scene.faces is not None:
             strongest = float(jnp.max(scene.faces.values["strength"]))
             penalty = max(penalty, 2 * float(scene.faces.stiffness), 50 * strongest / float(blade.thickness))
-    nodes = np.concatenate([split.minus, split.plus[:, ::-1]])
-    side = np.repeat([-1.0, 1.0], len(split.minus))
+    lip, beside = lips(split, LIPS * float(blade.thickness))
+    nodes = np.concatenate([split.minus, split.plus[:, ::-1], lip])
+    side = np.concatenate([np.repeat([-1.0, 1.0], len(split.minus)), beside])
     spare = -len(nodes) % build.PATCH
     sided = Wedge(**{**vars(blade), "side": jnp.asarray(np.concatenate([side, np.ones(spare)]))})
     softness = build.ONSET * modulus * float(blade.thickness) / (2 * width) / penalty / 10
@@ -144,12 +150,47 @@ def armed(
     return scene if friction is None else scene.put({"probe.friction": jnp.asarray(float(friction))})
 
 
+def lips(split: Split, reach: float) -> tuple[np.ndarray, Float[np.ndarray, " L"]]:
+    """Facets of the surface beside the cut, up to `reach` (m) from it and standing across its direction; their sides.
+
+    A blade that goes in drags the edge of the tissue along; where only the faces of the cut may touch, the surface
+    beside them turns into the blade and the elements at the corner fold.
+    """
+    points, geometry = np.asarray(split.geometry.points), split.geometry
+    facets = boundary(geometry.cells, geometry.cell_type).nodes
+    area = area_vectors(points, facets)
+    x = points[split.minus]
+    across = np.cross(x[:, 1] - x[:, 0], x[:, -1] - x[:, 0]).sum(0)
+    across /= np.linalg.norm(across)
+    middle, size = points[facets].mean(1), np.linalg.norm(area, axis=1)
+    off = (middle - x.mean((0, 1))) @ across
+    cut = np.isin(facets, np.unique(np.concatenate([split.minus, split.plus]))).all(1)
+    kept = ~cut & (np.abs(off) < reach) & (np.abs(area[:, 0]) > UPRIGHT * size)
+    return facets[kept], np.sign(off[kept])
+
+
 class _Outside(Shape):
     """Stands in for the blade while its patch is made: touches nothing."""
 
     def distance(self, x):
         """Far off."""
         return jnp.ones_like(x[0]), x
+
+
+def shoulder(thickness: float, slope: float, h: float) -> float:
+    """Radius of the shoulder for facets of size h, m: `ARC` of them, or `SHARP` of the thickness where they are finer.
+
+    A flat facet that comes over a sharper edge sinks in by its own sag, once an element: the tissue is shaken at that
+    pace, and damping takes up to a tenth of the force (h half the thickness). The edge that a radius R cuts off is
+    R (1 / cos(half the bevel's angle) - 1) high, 0.9 % of R at 15 degrees.
+    """
+    return min(max(ARC * h, SHARP * thickness), widest(thickness, slope))
+
+
+def widest(thickness: float, slope: float) -> float:
+    """Greatest radius of a shoulder, m: its arc takes up the whole bevel."""
+    angle = math.atan(slope)
+    return 0.5 * thickness / math.sin(angle) / math.tan(angle / 2)
 
 
 def refuse_blade(blade: Wedge) -> None:
@@ -160,11 +201,11 @@ def refuse_blade(blade: Wedge) -> None:
             f"blade of thickness {1e3 * b:.4g} mm and bevel slope {slope:.3g}: both must be positive (slope is the "
             "tangent of half the bevel's angle: 0.25 for 28 degrees)"
         )
-    if not 0 < R <= b / 2:
+    most = widest(b, slope)
+    if not 0 < R <= most:
         raise InputError(
-            f"blade rounding {1e3 * R:.4g} mm: between 0 and half the thickness ({500 * b:.4g} mm); a sharp shoulder "
-            "has "
-            "a normal that jumps, and derivatives would miss its force"
+            f"blade rounding {1e3 * R:.4g} mm: more than 0 and at most {1e3 * most:.4g} mm, where the bevel has no "
+            "room for the arc; a sharp shoulder has a normal that jumps, and derivatives would miss its force"
         )
 
 
