@@ -16,7 +16,7 @@ from tissuejax.storage import write_json
 
 jax.config.update("jax_enable_x64", True)
 
-PARTS = ("recovery", "derivatives", "bonded", "steady", "strength", "nearly", "strip", "beam", "cost")
+PARTS = ("derivatives", "recovery", "bonded", "steady", "strength", "nearly", "strip", "beam", "cost")
 
 
 def main(folder: Path) -> str:

@@ -82,12 +82,3 @@ def test_a_shoulder_is_as_round_as_its_facets_need_and_its_bevel_allows():
     seam.refuse_blade(round_one)
     with pytest.raises(InputError, match="no room"):
         seam.refuse_blade(Wedge(2e-3, slope, 1.01 * most))
-
-
-def test_a_rubbing_blade_goes_into_soft_tissue():
-    """Strength twice the shear modulus, friction 0.1: where only the faces of the cut touched, the corner turned into
-    the blade and folded when the shoulder came."""
-    out = run(cut(h=5e-4, length=0.011, travel=0.009, frames=20, bulk=2e4, strength=3000.0, friction=0.1))
-    force = -np.asarray(out.force[:, 0])
-    assert np.isfinite(force).all()
-    assert force[-1] > 0
