@@ -8,7 +8,7 @@ import pytest
 from tissuejax.diagnosis.bench import Segment
 from tissuejax.diagnosis.judgement.blocks import blocks
 from tissuejax.diagnosis.judgement.criteria import Criteria
-from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, amplitudes
+from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, amplitudes
 from tissuejax.diagnosis.probing_view import BLOCKS, probing_discrepancy
 
 NOISE = {"force": 0.007, "markers": 0.02}  # of the largest value, as in careful recordings
@@ -42,7 +42,8 @@ def left(presses, added, seed=0):
     noise = view.sigma * np.random.default_rng(seed).standard_normal(len(truth))
     linear = Linear(cut.mean(added + noise), cut.mean(truth)[:, None], np.zeros(1), np.zeros(1))
     widths = np.array([Criteria().shares[p.family] for p in parts])
-    v, _ = amplitudes(linear, parts, widths, Blocked(rows, cut.spread(view.sigma)), widths**2)
+    priors = Widths(widths, np.zeros(len(parts)))
+    v, _ = amplitudes(linear, parts, priors, Blocked(rows, cut.spread(view.sigma)), widths**2)
     return {p.name: float(np.sqrt(x)) for p, x in zip(parts, v, strict=True)}, parts, cut
 
 

@@ -99,7 +99,7 @@ def sure(d: Diagnosis) -> list[str]:
     present = [f"{n} {chance(p)}" for n, p in j.inclusion.items() if p > 0.01][:6]
     if present:
         out.append(f"Probability that an effect is present, over all sets weighed: {', '.join(present)}.")
-    names = [(s.label or joined(list(s.names)), p) for s, p in j.alternatives if p > 1e-6][:1]
+    names = [(joined(list(s.names)) or "nothing at all", p) for s, p in j.alternatives if p > 1e-6][:1]
     if names and j.kind in (Kind.FOUND, Kind.IN_PART):
         out.append(f"Exactly these and no other: {chance(j.exact)}; the next best account is {names[0][0]}.")
     r = a.empty
