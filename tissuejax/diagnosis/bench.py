@@ -116,6 +116,8 @@ class Bench(abc.ABC):
         warnings: sentences for the reader.
         known: values of effects that the base model has already, by path; they are in every prediction.
         spent: cost of all predictions so far, in those of the plain base model (see `Effort.spend`).
+        estimated: whether `sigma` is a guess from the recordings themselves: standard errors then follow what the
+            model leaves, be that more or less.
     """
 
     segments: Sequence[Segment]
@@ -130,6 +132,7 @@ class Bench(abc.ABC):
     warnings: list[str] = field(default_factory=list)
     spent: float = 0.0
     known: dict[str, float] = field(default_factory=dict)
+    estimated: bool = False
 
     @abc.abstractmethod
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:

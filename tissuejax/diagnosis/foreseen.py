@@ -15,7 +15,7 @@ from jaxtyping import Float
 
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.misfit import Misfit
-from tissuejax.diagnosis.refit import Refit
+from tissuejax.diagnosis.refit import Refit, inflation
 
 OPEN = 1.0  # standard error over noise from which a prediction counts as open: half of its misfit is not the model's
 
@@ -95,7 +95,7 @@ def _spread(bench: Bench, misfit: Misfit, r: Refit) -> tuple[tuple[str, ...], Fl
     fitted = misfit.whiten(bench.jacobian(r.values, paths, bench.fitted), bench.fitted)
     size = np.linalg.norm(fitted, axis=0)
     _, s, v = np.linalg.svd(fitted / size, full_matrices=False)
-    return paths, (v.T / s) * np.sqrt(max(1.0, r.chi2 / max(r.n - r.k, 1))) / size[:, None]
+    return paths, (v.T / s) * np.sqrt(inflation(bench, r.chi2, r.n, r.k)[0]) / size[:, None]
 
 
 def without(jac: Float[np.ndarray, "n k"], own: Float[np.ndarray, "n m"]) -> Float[np.ndarray, "n k"]:

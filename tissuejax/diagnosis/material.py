@@ -128,6 +128,7 @@ class MaterialBench(Bench):
             free={},
             start={},
             candidates={},
+            estimated=not any(sample.recordings[n].channels["nominal_stress"].noise_std for n in fitted),
         )
         bench._tests = tests
         bench._of = {n: [s for s in segments if s.recording == n] for n in recordings}

@@ -5,6 +5,7 @@ amplitudes rest on their bound exactly and leave it when the data want them to. 
 What belongs to one recording alone (an offset, a phase) is fitted on the held-out recordings too, all else fixed.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,6 +15,7 @@ from scipy.optimize import lsq_linear
 
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.misfit import Misfit
+from tissuejax.estimation.quantile import quantile
 
 HOPELESS = 2e-3  # of what exceeds noise: a fit that leaves much is not polished
 NOTHING = 1e-5  # of the largest effect of a parameter, each moved by its scale: what a one-sided difference errs by
@@ -30,6 +32,7 @@ class Refit:
         values: free paths and their values; `own` those of the held-out recordings themselves.
         std: standard errors (natural coordinates); nan on a bound or where nothing is identified.
         at_bound: paths that rest on a bound.
+        dof: degrees of freedom of the noise level behind `std`; infinite where the recorded one was used.
         chi2: whitened chi-square of the fitted recordings (without priors), n its number of samples.
         held: whitened chi-square of the held-out recordings, n_held its number of samples.
         prediction: the long vector.
@@ -46,6 +49,7 @@ class Refit:
     n_held: int
     converged: bool
     prediction: Float[np.ndarray, " N"]
+    dof: float = math.inf
 
     @property
     def k(self) -> int:
@@ -56,6 +60,25 @@ class Refit:
     def all(self) -> dict[str, float]:
         """Values of all recordings."""
         return {**self.values, **self.own}
+
+    def intervals(self, bench: Bench, confidence: float = 0.95) -> dict[str, tuple[float, float]]:
+        """Value -+ Student's quantile times standard error, cut at the bounds; of paths that are identified.
+
+        Of paths that move in logarithm the interval is the logarithm's: it never reaches zero.
+        """
+        q, found = quantile(confidence, self.dof), {}
+        for path, std in self.std.items():
+            free, value = bench.free[path], self.all[path]
+            if not np.isfinite(std):
+                continue
+            if free.log:
+                with np.errstate(over="ignore"):
+                    reach = float(np.exp(q * std / value))
+                low, high = value / reach, value * reach
+            else:
+                low, high = value - q * std, value + q * std
+            found[path] = max(low, free.lower), min(high, free.upper)
+        return found
 
 
 @dataclass
@@ -181,8 +204,9 @@ class Descent:
                 return x, cost, prediction, True
         return x, cost, prediction, False
 
-    def errors(self, x: np.ndarray, r: np.ndarray) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Standard errors in natural coordinates (scaled up by an honest misfit), and the paths on a bound."""
+    def errors(self, x: np.ndarray, r: np.ndarray) -> tuple[dict[str, float], tuple[str, ...], float]:
+        """Standard errors in natural coordinates (see `inflation`), the paths on a bound, degrees of freedom."""
+        inflate, dof = inflation(self.bench, float(r @ r), len(r), len(x))
         span = np.minimum(np.where(np.isfinite(self.high - self.low), self.high - self.low, 1.0), self.scale)
         at = (x - self.low < 1e-6 * span) | (self.high - x < 1e-6 * span)
         std = np.full(len(x), np.nan)
@@ -192,11 +216,26 @@ class Descent:
         if use.any():
             _, s, v = np.linalg.svd(jac[:, use] / norms[use], full_matrices=False)
             if s[-1] > 1e-8 * s[0]:
-                inflate = max(1.0, float(r @ r) / max(len(r) - len(x), 1))
                 std[use] = np.sqrt(inflate * np.sum((v.T / s) ** 2, axis=1)) / norms[use]
         values = self.natural(x)
         std = np.where(self.log, std * np.array([values[p] for p in self.paths]), std)
-        return dict(zip(self.paths, std.tolist())), tuple(p for p, b in zip(self.paths, at) if b)
+        return dict(zip(self.paths, std.tolist())), tuple(p for p, b in zip(self.paths, at) if b), dof
+
+
+def inflation(bench: Bench, chi2: float, n: int, k: int) -> tuple[float, float]:
+    """What variances of estimates are multiplied by, and the degrees of freedom behind it.
+
+    A recorded noise level is only widened where the misfit says that it is more; a guessed one (`Bench.estimated`)
+    gives way to what the model leaves, in either direction. Intervals then follow Student's distribution.
+
+    Args:
+        chi2: of n whitened residuals that k parameters were fitted to.
+    """
+    dof = max(n - k, 1)
+    scale = chi2 / dof
+    if not bench.estimated and scale <= 1.0:
+        return 1.0, math.inf
+    return max(scale, 1e-12), float(dof)
 
 
 def bounded(a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -235,12 +274,12 @@ def refit(
     first = descent.point(whole)
     known = None if seed is None else descent.scaled(seed, first)
     x, cost, prediction, converged = descent.run(first, iterations, tolerance, known)
-    values, own, std, at_bound = descent.natural(x), {}, {}, ()
+    values, own, std, at_bound, dof = descent.natural(x), {}, {}, (), math.inf
     r = misfit.residual(prediction, bench.fitted)
     chi2 = float(r @ r) if np.isfinite(cost) else np.inf
     held = np.full(misfit.count(bench.held_out), np.inf)
     if final and np.isfinite(chi2):
-        std, at_bound = descent.errors(x, r) if errors else ({}, ())
+        std, at_bound, dof = descent.errors(x, r) if errors else ({}, (), math.inf)
         belong = tuple(p for key in keys for p in bench.candidates[key].held)
         if belong and bench.held_out:
             second = Descent(bench, misfit, belong, bench.held_out, values)
@@ -249,4 +288,4 @@ def refit(
         prediction = bench.predict({**values, **own})
         held = misfit.residual(prediction, bench.held_out)
     outside = float(held @ held) if np.all(np.isfinite(held)) else np.inf
-    return Refit(tuple(keys), values, own, std, at_bound, chi2, len(r), outside, len(held), converged, prediction)
+    return Refit(tuple(keys), values, own, std, at_bound, chi2, len(r), outside, len(held), converged, prediction, dof)

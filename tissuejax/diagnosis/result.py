@@ -92,6 +92,7 @@ class Diagnosis:
             "after": self.errors(a.chosen),
             "held_out_uncertainty": [x.as_dict() for x in self.foreseen],
             "base_parameters": self.base(),
+            "interval": {"confidence": 0.95, "degrees_of_freedom": a.chosen.dof},
             "numerical_error": self._of(()).numerical,
             "explained": {"fitted": a.explained[0], "held_out": a.explained[1] if bench.held_out else None},
             "fitted": list(bench.fitted),
@@ -173,10 +174,17 @@ class Diagnosis:
     def effects(self, r: Refit) -> list[dict]:
         """Effects of a fit in the order in which they were added, with parameters, standard errors and units."""
         out, free = [], self.answered.bench.free
+        intervals = r.intervals(self.answered.bench)
         for key in r.keys:
             c = self.answered.bench.candidates[key]
             parameters = {
-                p: {"value": r.all[p], "std": r.std.get(p), "unit": free[p].unit, "at_bound": p in r.at_bound}
+                p: {
+                    "value": r.all[p],
+                    "std": r.std.get(p),
+                    "interval": list(intervals[p]) if p in intervals else None,
+                    "unit": free[p].unit,
+                    "at_bound": p in r.at_bound,
+                }
                 for p in (*c.paths, *c.held)
                 if p in r.all
             }
@@ -206,12 +214,14 @@ class Diagnosis:
     def base(self) -> dict:
         """Base parameters before and after."""
         bench, before, after = self.answered.bench, self.answered.empty, self.answered.chosen
+        around = after.intervals(bench)
         return {
             p: {
                 "before": before.values[p],
                 "before_std": before.std.get(p),
                 "after": after.values[p],
                 "after_std": after.std.get(p),
+                "after_interval": list(around[p]) if p in around else None,
                 "unit": bench.free[p].unit,
             }
             for p in bench.base

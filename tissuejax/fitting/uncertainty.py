@@ -8,11 +8,11 @@ what a sample is worth; then intervals follow Student's distribution with the re
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from statistics import NormalDist
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import t as student
+
+from tissuejax.estimation.quantile import quantile
 
 UNSEEN = 1.0  # a combination whose relative standard error exceeds this is called not identified
 SHARE = 0.3  # a parameter takes part in a combination from this share of its largest member on
@@ -46,11 +46,7 @@ class Uncertainty:
 
     def quantile(self, confidence: float = 0.95) -> float:
         """Half-width of a two-sided interval over the standard error: Student's t, 1.96 where the noise is known."""
-        return float(student.ppf(0.5 + confidence / 2, self.dof)) if math.isfinite(self.dof) else _normal(confidence)
-
-
-def _normal(confidence: float) -> float:
-    return NormalDist().inv_cdf(0.5 + confidence / 2)
+        return quantile(confidence, self.dof)
 
 
 def uncertainty(
