@@ -7,6 +7,9 @@ import tissuejax as tj
 from tissuejax.effects.catalogue import effect
 from tissuejax.errors import InputError
 from tissuejax.experiments.predictor import predictor
+from tissuejax.fitting.idle import merged, woken
+from tissuejax.fitting.idle import terms as idle_terms
+from tissuejax.fitting.least_squares import descend
 from tissuejax.fitting.setup import problem, split
 from tissuejax.fitting.starts import neutral
 from tissuejax.fitting.transforms import Box, Sticks, chained, unchained
@@ -146,3 +149,37 @@ def test_parts_of_a_whole_against_differences(rng):
         assert parts[:3].sum() < 0.8
     crowded = box.bounded(box.free(np.array([0.6, 0.6, 0.6, 0.0])))[0]
     assert crowded[:3].sum() < 0.8
+
+
+def test_an_idle_term_wakes_where_it_is_needed():
+    """A descent from a term without a share leaves it there; woken at the time that was missing it finds both."""
+    truth = [(0.2, 0.6), (0.3, 15.0)]
+    posed = problem(predictor(tj.material("neo-hookean", effects=["viscoelasticity-2"]), pulled(truth), ("r1", "r2")))
+    name = "effects.viscoelasticity."
+    dead = posed.start | {"energy.mu": MU, f"{name}g1": 0.4, f"{name}tau1": 12.0, f"{name}g2": 0.0, f"{name}tau2": 12.0}
+    stuck = descend(posed, dead)
+    left = posed.values(stuck.y)
+    assert left[f"{name}g2"] < 1e-3
+    assert stuck.cost > 3 * posed.n_samples
+    ready = woken(posed, left)
+    assert 0.2 < ready[f"{name}tau2"] < 2.0
+    found = descend(posed, ready)
+    assert 2 * found.cost == pytest.approx(posed.n_samples, rel=0.1)
+    values = posed.values(found.y)
+    pairs = sorted((values[f"{name}tau{i}"], values[f"{name}g{i}"]) for i in (1, 2))
+    assert pairs == [pytest.approx((0.6, 0.2), rel=0.05), pytest.approx((15.0, 0.3), rel=0.05)]
+    assert woken(posed, values) is None
+
+
+def test_terms_at_one_time_are_one():
+    posed = problem(
+        predictor(tj.material("neo-hookean", effects=["viscoelasticity-3"]), pulled([(0.3, 8.0)]), ("r1", "r2"))
+    )
+    name = "effects.viscoelasticity."
+    twins = posed.start | {f"{name}g{i}": 0.1 * i for i in (1, 2, 3)}
+    twins |= {f"{name}tau1": 8.0, f"{name}tau2": 1.0, f"{name}tau3": 8.0}
+    together, idle = merged(posed, twins)
+    assert together[f"{name}g1"] == pytest.approx(0.4)
+    assert idle == [(f"{name}g3", f"{name}tau3")]
+    np.testing.assert_allclose(posed.residuals(together), posed.residuals(twins), rtol=1e-9, atol=1e-9)
+    assert idle_terms(posed) == [[(f"{name}g{i}", f"{name}tau{i}") for i in (1, 2, 3)]]

@@ -16,6 +16,7 @@ from tissuejax.errors import InputError, NotConverged
 from tissuejax.fitting.advice import warnings_of
 from tissuejax.fitting.gradient_descent import METHODS as GRADIENT_METHODS
 from tissuejax.fitting.gradient_descent import gradient_descent
+from tissuejax.fitting.idle import terms, woken
 from tissuejax.fitting.levenberg_marquardt import Descent, levenberg_marquardt
 from tissuejax.fitting.losses import soften
 from tissuejax.fitting.problem import Problem
@@ -31,6 +32,7 @@ from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
 METHODS = ("levenberg-marquardt", *GRADIENT_METHODS)
 CONTRADICTED = 3.5  # standard deviations of chi-square from which the recorded noise is not what the residuals have
 AGAIN = 3  # rounds of re-estimating several unknown noise levels
+WORTH = 1e-4  # share of the misfit that waking an idle term must take for a further try
 
 
 def descend(
@@ -137,6 +139,9 @@ def fit(
             f"start was {_listed(problem, first)}; change it with --start, or the energy"
         )
     starts = [2 * d.cost for d in ends]
+    if multistart > 1:
+        best, more = _awake(problem, best, options)
+        n += more
     if problem.noise.estimated:
         problem, best, more = _with_estimated_noise(problem, best, options)
         n += more
@@ -212,6 +217,21 @@ def _scatter(problem: Problem, r: np.ndarray, jacobian: np.ndarray, memory: Seri
     chi2 = float(r @ r)
     known = not problem.noise.estimated and abs(chi2 - left) < CONTRADICTED * np.sqrt(2 * squares)
     return (1.0, np.inf) if known else (float(np.sqrt(chi2 / left)), max(1.0, left**2 / squares))
+
+
+def _awake(problem: Problem, best: Descent, options) -> tuple[Descent, int]:
+    """Go on from `best` with idle terms woken (`fitting.idle`), one at a time as long as that gains."""
+    n = 0
+    for _ in range(sum(len(series) for series in terms(problem))):
+        start = woken(problem, problem.values(best.y))
+        if start is None:
+            break
+        again = descend(problem, start, **options)
+        n += again.n_evaluations
+        if not again.cost < (1 - WORTH) * best.cost:
+            break
+        best = again
+    return best, n
 
 
 def _with_estimated_noise(problem: Problem, best: Descent, options) -> tuple[Problem, Descent, int]:
