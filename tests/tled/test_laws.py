@@ -12,6 +12,7 @@ from tissuejax.energies.volumetric import Quadratic
 from tissuejax.mesh.columns import box
 from tissuejax.recordings.recording import Geometry
 from tissuejax.tled import build, capsule, contact, statics, support
+from tissuejax.tled.history import Prony
 from tissuejax.tled.shapes import Platen
 from tissuejax.tled.simulate import run
 
@@ -40,13 +41,13 @@ def under_platen(height, time, counts=(3, 2, 2), **options):
     )  # fmt: skip
 
 
-def nominal(stretch: float) -> float:
+def nominal(stretch: float, law: dict[str, float] = cases.POLY) -> float:
     """Uniaxial nominal stress with free sides: the energy minimised over the lateral stretch, differentiated, Pa."""
 
     def energy(x, z):
         J = x * x * z
         e = J ** (-2 / 3) * (2 * x * x + z * z) - 3
-        return cases.POLY["C10"] * e + cases.POLY["C20"] * e * e + cases.BULK["K"] / 2 * (J - 1) ** 2
+        return law["C10"] * e + law["C20"] * e * e + cases.BULK["K"] / 2 * (J - 1) ** 2
 
     def least(z):
         return minimize_scalar(lambda x: energy(x, z), bounds=(0.7, 1.5), method="bounded", options={"xatol": 1e-12})
@@ -145,3 +146,39 @@ def test_friction_slides_at_its_limit_and_sticks_below(give):
         felt = contact.forces(probe, patch, u, jnp.array([way, 0, deep]), grip)
         assert float(felt.force[2]) == pytest.approx(push, rel=1e-6)
         assert float(felt.force[0]) == pytest.approx(-drag, rel=1e-6)
+
+
+def test_a_platen_off_centre_feels_the_torque_of_its_force():
+    """Uniform pressure on a rectangle: the force acts at its centre, so torque = centre x force about the reference."""
+    time = np.array([0.0, 0.4, 0.6])
+    aside = np.array([0.007, -0.004, 0.0])
+    scene = under_platen(SIZE[2] * np.array([1.0, 0.9, 0.9]), time, compression=2.0)
+    out = run(scene.put({"probe.position": scene.probe.position + aside}))
+    points = np.asarray(scene.body.points) + np.asarray(out.state.u).T
+    top = np.asarray(scene.body.points)[:, 2] > SIZE[2] - 1e-9
+    reference = aside + [0.0, 0.0, 0.9 * SIZE[2]]
+    arm = 0.5 * (points[top].min(0) + points[top].max(0)) - reference
+    assert np.abs(arm[:2]).max() > 0.1 * SIZE[0]
+    force, torque = np.asarray(out.force)[-5:].mean(0), np.asarray(out.torque)[-5:].mean(0)
+    assert force[2] > 0.01
+    np.testing.assert_allclose(torque, np.cross(arm, force), rtol=0.01, atol=1e-3 * abs(force[2]) * SIZE[0])
+
+
+@pytest.mark.parametrize("compression", [1.0, 3.0])
+def test_relaxation_runs_on_the_recordings_clock(compression):
+    """Pressed at once and held, the force falls to that of a softer law, and with tau: both clocks, however fast the
+    simulated one runs."""
+    g, tau = 0.4, 0.5
+    time = np.array([0.0, 0.1, 0.2, 2.0])
+    scene = under_platen(SIZE[2] * np.array([1.0, 1.0, 0.9, 0.9]), time, counts=(2, 2, 1), compression=compression)
+    scene = scene.put({"tissue.prony": Prony(jnp.array([g]), jnp.array([tau]))})
+    out = run(scene)
+    force, t = np.asarray(out.force)[:, 2], np.asarray(scene.clock.middles)
+    soft = {k: (1 - g) * v for k, v in cases.POLY.items()}
+    end = -nominal(0.9, soft) * AREA
+    held = (t > 0.3) & (t < 1.4)
+    rate, start = np.polyfit(t[held] - 0.2, np.log(force[held] - end), 1)
+    assert -1 / rate == pytest.approx(tau, rel=0.05)
+    begun = -nominal(0.9) * AREA
+    ramp = tau / 0.1 * (1 - np.exp(-0.1 / tau))  # a load raised evenly over 0.1 s has faded a little at its end
+    assert np.exp(start) == pytest.approx((begun - end) * ramp, rel=0.05)
