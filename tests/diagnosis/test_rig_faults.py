@@ -1,4 +1,4 @@
-"""The rig's own faults are named as such: clocks that differ, a load cell that bends; and relaxation is neither."""
+"""The rig's own faults are named as such: clocks that differ, a load cell that bends; relaxation is neither, nor a law."""
 
 import numpy as np
 import pytest
@@ -58,8 +58,14 @@ def relaxed(time, path, g=0.3, tau=1.5):
             0.9,
         ),
         (relaxed, "viscoelasticity", None, None),
+        (  # stiffer by a fifth where it is pulled far, softer where it is pushed: no power, no exponential
+            lambda t, path: elastic(path(t)) * (1 + 0.2 * np.tanh(9 * (path(t) - 1.08))),
+            "energy-form",
+            None,
+            None,
+        ),
     ],
-    ids=["clocks", "bent cell", "relaxation"],
+    ids=["clocks", "bent cell", "relaxation", "law of no form"],
 )
 def test_a_fault_of_the_rig_has_its_name_and_tissue_has_not(recorded, name, path, value):
     found = diagnose(sample(recorded), "neo-hookean", effects=TRIED, effort=QUICK)

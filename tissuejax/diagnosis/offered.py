@@ -7,7 +7,7 @@ is fitted; a clock is needed by all that acts in time (`untimed`).
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from tissuejax.recordings.recording import Recording, Sample
 
 SCATTER = Candidate("specimen-scatter", (), widens={"gain": 0.3})
 HYSTERESIS = Candidate("hysteresis", (), widens={"hysteresis": 0.15})
+LAW = Candidate("energy-form", (), form="smooth in stretch", widens={"law": 0.15})
 BACK = 0.05  # of the range of stretch: less of a way back is no unloading
 STILL = 0.05  # of the quickest rate: slower is a hold
 RATES = 1.5  # ratio from which two rates are two
@@ -153,9 +154,11 @@ def offered(
 ) -> tuple[dict[str, Candidate], list[str]]:
     """Candidates that the sample's recordings can show, and remarks on what was left out.
 
-    Two are added that have no parameters but let a part of the discrepancy be large: a stiffness and a law of each
-    recording's own (specimens that differ, or a gain that changed: stress and stretch can't tell), and a
-    rate-independent hysteresis.
+    Three are added that have no parameters but let a part of the discrepancy be large: a stiffness and a law of each
+    recording's own (specimens that differ, or a gain that changed: stress and stretch can't tell), a
+    rate-independent hysteresis, and a strain energy of a form that no term of the catalogue has: what is smooth in
+    stretch, and the same for all recordings of one kind, needs no process to explain it. Where no strain was passed
+    twice, a law of each recording's own is one that fails to carry from one strain to another: that form too.
 
     Args:
         names: effects asked for; all by default.
@@ -164,10 +167,12 @@ def offered(
     if not timed(sample):
         kept = without_clock(kept)
         remarks.append("no time was recorded: effects that act in time (relaxation, drift, aging) were not tried")
-    for own in (SCATTER, HYSTERESIS):
+    for own in (SCATTER, HYSTERESIS, LAW):
         if names is None or own.name in names:
             kept[own.key] = own
     protocol, why = Protocol.of(sample), {}
+    if LAW.key in kept and not protocol.repeated:
+        kept[LAW.key] = replace(LAW, widens={**LAW.widens, **dict.fromkeys(SCATTER.widens, LAW.widens["law"])})
     for name, need in sorted(needs().items()):
         if any(c.name == name for c in kept.values()) and not getattr(protocol, need):
             kept = {k: c for k, c in kept.items() if c.name != name}

@@ -97,6 +97,11 @@ class Exploration:
         """Effects in a set, whatever their form."""
         return frozenset(self.bench.candidates[k].name for k in key)
 
+    def company(self, key: frozenset) -> frozenset:
+        """The same, but a form that only widens the discrepancy apart from the others of its effect."""
+        known = self.bench.candidates
+        return frozenset(k if known[k].widens else known[k].name for k in key)
+
     def ranked(self, size: int) -> list[frozenset]:
         """The best form of every set of `size` effects, best first."""
         found: dict[frozenset, frozenset] = {}
@@ -221,16 +226,16 @@ class Exploration:
         lists = []
         for key in parents:
             free = [c for c in self.bench.candidates.values() if c.widens and c.name not in self.names(key)]
-            seen = {c.name: [Score(c.key, math.inf, 0.0, {}, {}, np.zeros(0), ((0.0, {}, {}),))] for c in free}
+            seen = {c.key: [Score(c.key, math.inf, 0.0, {}, {}, np.zeros(0), ((0.0, {}, {}),))] for c in free}
             for s in self.score(key):
                 if s.gain < (LITTLE if not key else 0.0):
                     break
                 seen.setdefault(self.bench.candidates[s.key].name, []).append(s)
             lists.append([(key, rows[0]) for rows in itertools.islice(seen.values(), each)])
-        tried = {self.names(k) for k in self.weighed}
+        tried = {self.company(k) for k in self.weighed}
         for row in itertools.zip_longest(*lists):
             for key, score in filter(None, row):
-                company = self.names(key | {score.key})
+                company = self.company(key | {score.key})
                 if most <= 0 or company in tried:
                     continue
                 tried.add(company)

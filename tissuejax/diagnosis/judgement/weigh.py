@@ -71,15 +71,18 @@ class Scales:
     def priors(self, criteria: Criteria, keys: Sequence[str] = ()) -> Widths:
         """Prior of the amplitudes where the effects `keys` act.
 
-        A family whose widening has a name that these recordings can show is wide with that name alone; any other may
-        be wider without one.
+        A family whose widening has a name that these recordings can show is wide with that name alone: always in the
+        form that is nothing else, as likely as not beside another form of it. Any other may be wider without a name.
         """
         candidates = self.bench.candidates
-        named = {f for c in candidates.values() for f in c.widens}
+        named = {f: c.name for c in candidates.values() for f in c.widens}
         wide = {f: w for key in keys for f, w in candidates[key].widens.items()}
+        acting = {candidates[key].name for key in keys}
         free = np.array([f not in named for f in self.families])
+        partly = np.array([f not in wide and named.get(f) in acting for f in self.families])
         width = np.array([wide.get(f, criteria.shares[f]) for f in self.families])
-        return Widths(width, free * criteria.unknown / max(int(np.sum(free)), 1), criteria.strange)
+        chance = free * criteria.unknown / max(int(np.sum(free)), 1) + 0.5 * partly
+        return Widths(width, chance, criteria.strange)
 
     def effect_size(self, candidate: Candidate, values: Mapping[str, float], criteria: Criteria) -> dict[str, float]:
         """For every amplitude of a candidate, the value that changes the stress by `change` of it, to first order.
