@@ -1,4 +1,4 @@
-"""The rig's own faults are named as such: clocks that differ, a load cell that bends; relaxation is neither, nor a law."""
+"""The rig's own faults are named: clocks that differ, a load cell that bends; relaxation is neither, nor is a law."""
 
 import numpy as np
 import pytest
