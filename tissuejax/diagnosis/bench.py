@@ -78,6 +78,7 @@ class Candidate:
         beside: keys of the poorer and the richer form.
         widens: families of the discrepancy that may be far larger where this acts, with the width of their prior; such
             a candidate has no parameters of its own.
+        rig: a fault of the rig, and not of the tissue.
     """
 
     name: str
@@ -89,6 +90,7 @@ class Candidate:
     nominated: bool = True
     beside: tuple[str, ...] = ()
     widens: Mapping[str, float] = field(default_factory=dict)
+    rig: bool = False
 
     @property
     def key(self) -> str:

@@ -121,6 +121,7 @@ class Entry:
                     form=form.name,
                     held=tuple(held),
                     nominated=form.nominated,
+                    rig=self.effect.order == 0,
                 )
             )
         times = [p for p in free if p.startswith(f"{prefix}.tau") and p[-1].isdigit()]

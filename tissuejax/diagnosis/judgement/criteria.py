@@ -24,6 +24,8 @@ class Criteria:
         change: standard deviation of the half-normal (two-sided: normal) prior of an effect's amplitude: the change of
             the stress that it makes alone, as a share of the stress (root mean squares). Ground: effects worth a name
             are some per cent to a half of what is measured.
+        rig: the same of a fault of the rig (`Effect.order` 0). Ground: a tenth of all that is measured is as far as a rig
+            goes wrong unnoticed; most are verified to 1 %.
         shape: standard deviation of the logarithm of a positive shape (time, energy, exponent) about the middle of
             the values scanned. Ground: a factor of 5 either way.
         negligible: root mean square of the rest, as a share of the peak, up to which nothing of note is left.
@@ -43,7 +45,12 @@ class Criteria:
     )
     strange: float = 10.0
     change: float = 0.3
+    rig: float = 0.1
     shape: float = float(np.log(5.0))
     negligible: float = 0.005
     named: float = 0.5
     covered: float = 0.9
+
+    def usual(self, rig: bool) -> float:
+        """How much of the stress an effect changes, of the rig or of the tissue."""
+        return self.rig if rig else self.change

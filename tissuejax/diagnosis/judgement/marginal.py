@@ -144,9 +144,8 @@ def marginal(linear: Linear, parts: Sequence[Part], v: Float[np.ndarray, " K"], 
         half = g @ (size[:, None] * cho_solve(c, np.diag(size), check_finite=False))  # g M^-1
         return _derivatives(parts, blocked, inverse, g, half, left)
 
-    schur = m[q:, q:]
-    if q:
-        schur = schur - m[q:, :q] @ np.linalg.solve(m[:q, :q], m[:q, q:])
+    last = np.tril(c[0])[q:, q:] / size[q:, None]  # of the factor: its square is the Schur complement H
+    schur = last @ last.T
     return Marginal(value, schur, found[q:], derivatives)
 
 

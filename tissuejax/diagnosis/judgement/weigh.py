@@ -2,7 +2,7 @@
 
 Parameters of the base have flat priors, the same in every set. An effect's amplitude has a normal prior about neutral,
 one-sided where the effect is; its width is in terms of what it does: the amplitude that changes the stress by
-`Criteria.change` of it (derivative at neutral, at the base fit). So one number serves gaps, moduli and rates; an effect
+`Criteria.change` of it, or `Criteria.rig` (derivative at neutral, at the base fit). So one number serves gaps, moduli and rates; an effect
 that only corrects what was noted says itself how far that may be wrong (`Effect.misjudged`). Positive
 shapes have normal priors of their logarithms. Fit and amplitudes of the discrepancy are found in turn.
 """
@@ -85,7 +85,7 @@ class Scales:
         return Widths(width, chance, criteria.strange)
 
     def effect_size(self, candidate: Candidate, values: Mapping[str, float], criteria: Criteria) -> dict[str, float]:
-        """For every amplitude of a candidate, the value that changes the stress by `change` of it, to first order.
+        """For every amplitude of a candidate, the value that changes the stress as much as is usual, to first order.
 
         Of an amplitude that does nothing at these shapes (fibres that nothing stretches) it is taken at those scanned;
         of one that does nothing there either, its typical value: its prior has to be a density, whatever its width.
@@ -100,7 +100,7 @@ class Scales:
             for a, c in zip(left, columns.T, strict=True):  # over what it acts on: its own recording, say
                 moved, stress = squared(c), squared(self.reference[c != 0])
                 if 0 < moved < math.inf and stress > 0:
-                    out[a] = criteria.change * math.sqrt(stress / moved)
+                    out[a] = criteria.usual(candidate.rig) * math.sqrt(stress / moved)
         return {a: out.get(a, self.bench.free[a].scale) for a in candidate.amplitudes}
 
 
