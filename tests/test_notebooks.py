@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 BARE = ("real-time",)  # not stored with outputs yet: it only has to run
 STORED = [p for p in NOTEBOOKS if p.stem not in BARE]
+LONG = ("which-ogden-form", "probing-stl")  # run by `make slow`
 LARGEST = 200_000  # bytes of a stored notebook
 NEAR, SMALL = 0.1, 1e-2  # numbers printed again: this near, or both this small (errors, differences)
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
@@ -24,7 +25,10 @@ def printed(notebook) -> str:
     return re.sub(r"/tmp/\w+", "/tmp/x", "".join(streams))
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] if p.stem in LONG else []) for p in NOTEBOOKS],
+)
 def test_it_runs_and_prints_what_is_stored(path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
     notebook = nbformat.read(path, as_version=4)

@@ -67,6 +67,7 @@ def bench() -> MaterialBench:
     )
 
 
+@pytest.mark.slow
 def test_two_unlike_families_are_found_from_off_the_axis(bench):
     """The tests, all along axes, can't tell an angle from its mirror image: 110 and 170 degrees from 70 and 10."""
     whole = copy.copy(bench)

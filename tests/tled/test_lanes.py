@@ -54,8 +54,11 @@ def _pulled(forces, by_c, w):
     [
         lambda f, w, by_c: lambda x, u: f(x, u, by_c),
         lambda f, w, by_c: lambda x, u: jax.jacfwd(lambda x: f(x, u, by_c))(x),
-        lambda f, w, by_c: (
-            lambda x, u: jax.vmap(jax.grad(_pulled(f, by_c, w), (0, 1)), (0, None))(jnp.stack([x, 1.1 * x]), u)
+        pytest.param(
+            lambda f, w, by_c: (
+                lambda x, u: jax.vmap(jax.grad(_pulled(f, by_c, w), (0, 1)), (0, None))(jnp.stack([x, 1.1 * x]), u)
+            ),
+            marks=pytest.mark.slow,
         ),
     ],
     ids=["forces", "Jacobian", "batch of gradients"],

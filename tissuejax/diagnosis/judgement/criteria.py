@@ -24,8 +24,8 @@ class Criteria:
         change: standard deviation of the half-normal (two-sided: normal) prior of an effect's amplitude: the change of
             the stress that it makes alone, as a share of the stress (root mean squares). Ground: effects worth a name
             are some per cent to a half of what is measured.
-        rig: the same of a fault of the rig (`Effect.order` 0). Ground: a tenth of all that is measured is as far as a rig
-            goes wrong unnoticed; most are verified to 1 %.
+        rig: the same of a fault of the rig (`Effect.order` 0). Ground: a tenth of all that is measured is as far as a
+            rig goes wrong unnoticed; most are verified to 1 %.
         shape: standard deviation of the logarithm of a positive shape (time, energy, exponent) about the middle of
             the values scanned. Ground: a factor of 5 either way.
         negligible: root mean square of the rest, as a share of the peak, up to which nothing of note is left.

@@ -2,9 +2,9 @@
 
 Parameters of the base have flat priors, the same in every set. An effect's amplitude has a normal prior about neutral,
 one-sided where the effect is; its width is in terms of what it does: the amplitude that changes the stress by
-`Criteria.change` of it, or `Criteria.rig` (derivative at neutral, at the base fit). So one number serves gaps, moduli and rates; an effect
-that only corrects what was noted says itself how far that may be wrong (`Effect.misjudged`). Positive
-shapes have normal priors of their logarithms. Fit and amplitudes of the discrepancy are found in turn.
+`Criteria.change` of it, or `Criteria.rig` (derivative at neutral, at the base fit). So one number serves gaps, moduli
+and rates; an effect that only corrects what was noted says itself how far that may be wrong (`Effect.misjudged`).
+Positive shapes have normal priors of their logarithms. Fit and amplitudes of the discrepancy are found in turn.
 """
 
 import copy
