@@ -68,7 +68,8 @@ def relaxed(time, path, g=0.3, tau=1.5):
     ids=["clocks", "bent cell", "relaxation", "law of no form"],
 )
 def test_a_fault_of_the_rig_has_its_name_and_tissue_has_not(recorded, name, path, value):
-    found = diagnose(sample(recorded), "neo-hookean", effects=TRIED, effort=QUICK)
+    found = diagnose(sample(recorded), "neo-hookean", effects=TRIED, effort=QUICK, holdout=("last",))
     assert found.verdict.judgement.names == (name,)
+    assert found.verdict.explained[1] > 0.95  # of what the base misses in the recording that nothing was fitted to
     if path:
         assert found.verdict.chosen.values[path] == pytest.approx(value, rel=0.1)

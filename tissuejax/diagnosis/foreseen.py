@@ -14,6 +14,8 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.diagnosis.bench import Bench
+from tissuejax.diagnosis.judgement.carried import carried
+from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.misfit import Misfit
 from tissuejax.diagnosis.refit import Refit, inflation
 
@@ -58,7 +60,7 @@ def foreseen(bench: Bench, misfit: Misfit, r: Refit) -> list[Foreseen]:
     paths, half = _spread(bench, misfit, r)
     if not paths:
         return []
-    whole = bench.jacobian(r.all, (*paths, *r.own), bench.held_out)
+    whole = _moved(bench, misfit, r, (*paths, *r.own))
     out = []
     for name in bench.held_out:
         own = bench.mask((name,))
@@ -83,8 +85,14 @@ def prediction_std(bench: Bench, misfit: Misfit, r: Refit) -> Float[np.ndarray, 
     paths, half = _spread(bench, misfit, r)
     if not paths:
         return np.zeros(len(bench.y))
-    moved = bench.jacobian(r.all, paths, (*bench.fitted, *bench.held_out)) @ half
+    moved = _moved(bench, misfit, r, paths) @ half
     return np.sqrt(np.sum(moved**2, axis=1))
+
+
+def _moved(bench: Bench, misfit: Misfit, r: Refit, paths: tuple[str, ...]) -> Float[np.ndarray, "N k"]:
+    """Derivative of what is predicted, with what follows the measurements (`carried`) and takes its part."""
+    jac = bench.jacobian(r.all, paths, (*bench.fitted, *bench.held_out))
+    return jac - carried(misfit, jac) if isinstance(misfit, Whitening) else jac
 
 
 def _spread(bench: Bench, misfit: Misfit, r: Refit) -> tuple[tuple[str, ...], Float[np.ndarray, "k k"]]:

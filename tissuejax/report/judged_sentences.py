@@ -110,6 +110,11 @@ def sure(d: Diagnosis) -> list[str]:
         held = f", {math.sqrt(c.held / c.n_held):.3g} in the held-out ones" if a.bench.held_out else ""
         out.append(f"With the effects by {math.sqrt(c.chi2 / c.n):.3g} times{held}.")
     rest = a.rest()
+    own = [f"{_part(k)} {100 * v:.2g} %" for k, v in rest["named"].items() if v > 1e-3]
+    if own:
+        out.append(
+            f"Of what has a name, beyond its parameters (typical amplitudes, shares of the stress): {'; '.join(own)}."
+        )
     large = [f"{_part(k)} {100 * v:.2g} %" for k, v in rest["parts"].items() if v > 1e-3 and k != "numerical"]
     if large:
         out.append(f"What is left, by kind, as shares of the stress (typical amplitudes): {'; '.join(large)}.")

@@ -15,6 +15,7 @@ from jaxtyping import Float
 
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.judgement.blocks import Blocks
+from tissuejax.diagnosis.judgement.carried import carried
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.explore import Effort, Exploration, explore
@@ -104,8 +105,10 @@ class Answered:
         )
 
     def rest(self) -> dict:
-        """What the chosen model leaves beyond noise: `rms`, Pa, of the discrepancy's posterior mean; shares."""
+        """What the chosen model leaves beyond noise: `rms`, Pa, of the discrepancy's posterior mean; shares; typical
+        amplitudes of its `parts`, and of those that are the business of an effect that is `named`."""
         s, e = self.judgement.chosen, self.exploration
+        named = e.scales.widened(s.keys)
         w = e.weighed[frozenset(s.keys)]
         peak, blocks = e.scales.peak, e.scales.cut.counts
         squares = {}
@@ -121,7 +124,8 @@ class Answered:
             "share_of_peak": float(np.sqrt(whole / np.sum(blocks))) / peak,
             "negligible": self.judgement.negligible,
             "recordings": {n: x / whole if whole else 0.0 for n, x in squares.items()},
-            "parts": dict(s.amplitudes),
+            "parts": {p.name: s.amplitudes[p.name] for p in w.parts if p.family not in named},
+            "named": {p.name: s.amplitudes[p.name] for p in w.parts if p.family in named},
             "kurtosis": s.kurtosis,
         }
 
@@ -170,12 +174,13 @@ def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
     weighed, scales = out.exploration.weighed[frozenset(keys)], out.exploration.scales
     start = {p: v for p, v in weighed.refit.values.items() if p in out.fitting.free}
     bench = out.fitting.anchored(start)
-    whitening = Whitening(bench, scales.cut, scales.blocked, weighed.parts, weighed.v)
+    whitening = Whitening(bench, scales.cut, scales.blocked, weighed.parts, weighed.v, scales.widened(keys))
     misfit = whitening if keys or bench is not out.fitting else white(bench)
     fit = refit(bench, misfit, keys, start)
     near = bench.anchored(fit.values)
     if near is not bench:
         fit = replace(fit, prediction=near.predict(fit.values))
+    fit = replace(fit, prediction=fit.prediction + carried(whitening, (bench.y - fit.prediction)[:, None])[:, 0])
     out.plain[frozenset(keys)], out.whitenings[frozenset(keys)] = fit, whitening
     shown = out.bench
     fit = replace(fit, prediction=bench.natural(fit.prediction))

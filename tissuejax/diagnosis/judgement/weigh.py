@@ -9,7 +9,7 @@ Positive shapes have normal priors of their logarithms. Fit and amplitudes of th
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -83,6 +83,12 @@ class Scales:
         width = np.array([wide.get(f, criteria.shares[f]) for f in self.families])
         chance = free * criteria.unknown / max(int(np.sum(free)), 1) + 0.5 * partly
         return Widths(width, chance, criteria.strange)
+
+    def widened(self, keys: Sequence[str]) -> frozenset[str]:
+        """Families of the discrepancy that are the business of the effects `keys`, in whatever form they act."""
+        candidates = self.bench.candidates
+        acting = {candidates[key].name for key in keys}
+        return frozenset(f for c in candidates.values() if c.name in acting for f in c.widens)
 
     def effect_size(self, candidate: Candidate, values: Mapping[str, float], criteria: Criteria) -> dict[str, float]:
         """For every amplitude of a candidate, the value that changes the stress as much as is usual, to first order.
@@ -291,7 +297,7 @@ def _impossible(scales: Scales, keys: Sequence[str]) -> Weighed:
 
 def _described(scales: Scales, keys: Sequence[str], best: tuple) -> Weighed:
     total, value, occam, fit, v, m, bound, descent, residual, parts, bench = best
-    smoothed, scatter = _rest(scales, parts, v, residual)
+    smoothed, scatter = _rest(scales, parts, v, residual, scales.widened(keys))
     chi2 = float(np.sum((residual / scales.blocked.sigma) ** 2))
     before = scales.cut.mean(bench.y - scales.bench.predict(scales.values)) / scales.blocked.sigma
     n = len(residual)
@@ -348,9 +354,15 @@ def _idle(c: Candidate, fit: Refit, bench: Bench, peak: float) -> bool:
     return bool(np.max(np.abs(without - fit.prediction)) <= NOTHING * peak)
 
 
-def _rest(scales: Scales, parts: Sequence[Part], v: Float[np.ndarray, " K"], residual: Float[np.ndarray, " M"]):
-    """Posterior mean and variance of the discrepancy at the blocks, without scatter from sample to sample and without
-    the known error of a simulation (its variance is that of both together)."""
+def _rest(
+    scales: Scales,
+    parts: Sequence[Part],
+    v: Float[np.ndarray, " K"],
+    residual: Float[np.ndarray, " M"],
+    named: Collection[str],
+):
+    """Posterior mean and variance of the discrepancy at the blocks, without scatter from sample to sample, without
+    what has a name and without the known error of a simulation (the variance is that of all together)."""
     white = np.array([p.family == "white" for p in parts])
     noise = Blocked(scales.blocked.rows, scales.blocked.sigma)
     inverse = [np.linalg.inv(b) for b in noise.within(parts, v)]
@@ -363,7 +375,9 @@ def _rest(scales: Scales, parts: Sequence[Part], v: Float[np.ndarray, " K"], res
     scattered = noise.within([p for p, x in zip(parts, white, strict=True) if x], v[white])
     errors = np.concatenate([np.diag(s) for s in scattered])
     own = np.concatenate([np.diag(i) for i in inverse]) - np.sum((g @ inner) * g, axis=1)
-    known = [x * p.factor @ (p.factor.T @ w) for p, x in zip(parts, v, strict=True) if p.family == "numerical"]
+    known = [
+        x * p.factor @ (p.factor.T @ w) for p, x in zip(parts, v, strict=True) if p.family in {"numerical", *named}
+    ]
     return residual - errors * w - sum(known), np.maximum(errors - errors**2 * own, 0.0)
 
 

@@ -21,6 +21,7 @@ class Whitening:
 
     Attributes:
         parts, v: of the discrepancy, and their squared amplitudes.
+        named: families of parts that belong to the model: they are the business of an effect that has a name.
     """
 
     bench: Bench
@@ -28,6 +29,7 @@ class Whitening:
     blocked: Blocked
     parts: Sequence[Part]
     v: Float[np.ndarray, " K"]
+    named: frozenset[str] = frozenset()
     _roots: dict = field(default_factory=dict, repr=False)
 
     def _root(self, recordings: tuple[str, ...]):
