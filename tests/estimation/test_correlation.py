@@ -177,3 +177,18 @@ def test_the_likelihood_is_that_of_the_dense_covariance(rng):
     for i, j in ((0, 0), (3, 5), (5, 6)):
         theirs = dense(shares[i], taus[j], walk[i, j])
         assert found[i, j] == pytest.approx(theirs, abs=1e-5)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_order_of_a_low_pass_is_told_where_it_is_asked_for(order):
+    """Drawn from the covariance matrix; 1.0 s of correlation at 12.5 Hz."""
+    time = np.arange(400) * 0.08
+    d = np.abs(time[:, None] - time) / 0.4
+    factor = np.linalg.cholesky((np.exp(-d) if order == 1 else (1 + d) * np.exp(-d)) + 1e-9 * np.eye(len(time)))
+    rng = np.random.default_rng(5)
+    found = estimate(
+        [Series(time, factor @ rng.normal(size=(400, 1))) for _ in range(2)], recorded=False, orders=(1, 2)
+    )
+    assert found.noises[0].order == order
+    assert found.noises[0].tau == pytest.approx(0.4, rel=0.3)
+    assert found.levels[0] == pytest.approx(1.0, rel=0.3)

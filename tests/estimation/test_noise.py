@@ -87,3 +87,25 @@ def test_refusals():
         Noise(0.1, 1.0, 1.0).whiten(np.zeros(3), np.array([0.0, 1.0, 0.5]))
     with pytest.raises(InputError, match="3 samples at 2 times"):
         Noise().whiten(np.zeros(3), np.zeros(2))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_every_operation_against_the_covariance_matrix(order, rng):
+    """Factor, determinant, product, squares and draws by dense linear algebra, at uneven times."""
+    time = np.sort(rng.uniform(0, 12, 40))
+    noise = Noise(0.4, 1.1, 0.8, order)
+    d = np.abs(time[:, None] - time) / 0.8
+    c = 1.21 * (np.exp(-d) if order == 1 else (1 + d) * np.exp(-d)) + 0.16 * np.eye(40)
+    x = rng.normal(size=(40, 3))
+    np.testing.assert_allclose(noise.covariance(time), c, rtol=1e-12)
+    np.testing.assert_allclose(noise.whiten(x, time), np.linalg.solve(np.linalg.cholesky(c), x), rtol=1e-8, atol=1e-10)
+    assert noise.log_determinant(time) == pytest.approx(np.linalg.slogdet(c)[1], rel=1e-9)
+    np.testing.assert_allclose(noise.times(x, time), c @ x, rtol=1e-9, atol=1e-9)
+    assert noise.squares(time) == pytest.approx(np.sum(c**2), rel=1e-9)
+    draws = np.array([noise.sample(rng, time) for _ in range(1500)])
+    np.testing.assert_allclose(draws.T @ draws / 1500, c, atol=0.2)
+
+
+def test_other_orders_are_refused():
+    with pytest.raises(InputError, match="order 3"):
+        Noise(0.4, 1.1, 0.8, 3)

@@ -32,8 +32,7 @@ from tissuejax.estimation.noise import Noise
 
 LEAST = 64  # samples of a series from which its correlation can be told from a mismatch
 GAIN = 8.0  # twice the log-likelihood by which correlated noise must beat white: 2 Akaike units a parameter beyond cost
-SHARES, TAUS, WALKS = 6, 7, 9  # tried at once of the share, the time, the intensity of the walk
-TRIALS = SHARES * TAUS * WALKS  # one compiled program for them
+SHARES, TAUS, WALKS = 6, 7, 9  # tried at once of the share, the time, the intensity of the walk: one program
 ROUNDS = 3  # of trials, each in a narrower range
 DIFFUSE = 1e4  # prior variance of the mismatch's level over that of the residual
 NEVER_WHITE = 1e-3  # least share of white noise that is tried
@@ -69,11 +68,16 @@ class Estimate:
     common: bool = True
 
 
-def estimate(series: Sequence[Series], recorded: bool = True) -> Estimate:
+def estimate(
+    series: Sequence[Series], recorded: bool = True, orders: tuple[int, ...] = (1,), mismatch: bool = True
+) -> Estimate:
     """Correlation of the noise in several residuals.
 
     Args:
         recorded: False where the standard deviation was not recorded: then correlated noise may have any.
+        orders: of the low-pass that may stand before the noise; the likelier one is taken.
+        mismatch: False where all that is left shall be noise, as for intervals, which a mismatch then widens; noise
+            behind a low-pass of second order falls as f^-4 too and is not told from a mismatch otherwise.
 
     Returns:
         White noise where nothing else is clearly better; short series (< `LEAST` samples) take the shape of the others
@@ -83,25 +87,25 @@ def estimate(series: Sequence[Series], recorded: bool = True) -> Estimate:
     levels = [float(np.std(s.values)) or 1.0 if len(s.time) else 1.0 for s in series]
     if not long:
         return Estimate((Noise(),) * len(series), tuple(levels))
-    surfaces = [_Surface(series[i], recorded) for i in long]
-    shared = _best(surfaces)
+    surfaces = [_Surface(series[i], recorded, mismatch) for i in long]
+    shared = _best(surfaces, orders)
     price = 2 * (len(surfaces) - 1) * math.log(sum(s.n for s in surfaces))
     common = 2 * shared.apart < 0.5 * price  # on a coarse grid; the rest is seen where it may matter
-    alone = [_best([s]) for s in surfaces] if not common else [shared] * len(surfaces)
+    alone = [_best([s], orders) for s in surfaces] if not common else [shared] * len(surfaces)
     common = common or 2 * (sum(a.likelihood for a in alone) - shared.likelihood) <= price
-    noises = [Noise.shaped(shared.share, shared.tau)] * len(series)
+    noises = [Noise.shaped(shared.share, shared.tau, order=shared.order)] * len(series)
     for i, own, level in zip(long, alone, shared.levels):
         levels[i] = level if common else own.levels[0]
         if not common:
-            noises[i] = Noise.shaped(own.share, own.tau)
+            noises[i] = Noise.shaped(own.share, own.tau, order=own.order)
     return Estimate(tuple(noises), tuple(levels), common)
 
 
 class _Surface:
     """The likelihood of one series, the walk's intensity and the level at their best."""
 
-    def __init__(self, series: Series, capped: bool = True):
-        self.capped = capped
+    def __init__(self, series: Series, capped: bool = True, mismatch: bool = True):
+        self.capped, self.tried = capped, WALKS if mismatch else 1
         time = np.asarray(series.time, float) - series.time[0]
         self.n, self.columns = len(time), series.values.reshape(len(time), -1).T
         self.span, self.step = time[-1], float(np.median(np.diff(time)))
@@ -117,13 +121,15 @@ class _Surface:
         self.turns = np.isin(np.arange(padded), series.kinks)
         self.padded = [np.pad(c, (0, padded - self.n)) for c in self.columns]
 
-    @staticmethod
-    def walks(low: float, high: float, n: int) -> np.ndarray:
-        """No walk, and n - 1 intensities between two powers of ten."""
+    def walks(self, low: float, high: float, n: int = 1) -> np.ndarray:
+        """No walk, and as many intensities between two powers of ten as make `n` times those tried at once."""
+        n = n * self.tried
+        if self.tried == 1:
+            return np.zeros(n)
         return np.concatenate([[0.0], np.logspace(low, high, n - 1)])
 
     def __call__(
-        self, shares: np.ndarray, taus: np.ndarray, walks: np.ndarray, free: bool
+        self, shares: np.ndarray, taus: np.ndarray, walks: np.ndarray, free: bool, order: int = 1
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Log-likelihood, intensity of the walk and variance at their best, for every share and time.
 
@@ -133,7 +139,8 @@ class _Surface:
         """
         trials = [x.ravel() for x in np.meshgrid(shares, taus, walks, indexing="ij")]
         with jax.enable_x64(True):
-            parts = [_filtered(self.steps, c, self.seen, self.turns, *trials, *self.prior) for c in self.padded]
+            run = _filtered if order == 1 else _filtered_twice
+            parts = [run(self.steps, c, self.seen, self.turns, *trials, *self.prior) for c in self.padded]
         logs, squares = (np.sum([np.asarray(part[i]) for part in parts], axis=0) for i in (0, 1))
         n = self.n * len(parts)
         # white noise may exceed what was recorded, nothing else is like it; correlated noise may not
@@ -159,27 +166,31 @@ class _Found:
     likelihood: float
     levels: list[float]
     apart: float = 0.0
+    order: int = 1
 
 
-def _best(surfaces: Sequence[_Surface]) -> _Found:
+def _best(surfaces: Sequence[_Surface], orders: tuple[int, ...] = (1,)) -> _Found:
     """White noise or, if that is clearly better, correlated; of the recorded level unless that is clearly wrong.
 
     Whether it is correlated is asked with the level free: a level that is a little off must not be read as a shape.
     """
-    told = [s(np.zeros(1), np.ones(1), s.walks(s.least, s.most, TRIALS), True) for s in surfaces]
+    told = [s(np.zeros(1), np.ones(1), s.walks(s.least, s.most, SHARES * TAUS), True) for s in surfaces]
     white = _Found(0.0, 1.0, sum(float(t[0][0, 0]) for t in told), [math.sqrt(t[2][0, 0]) for t in told])
-    found = _correlated(surfaces, [float(t[0][0, 0]) for t in told], True)
+    alone = [float(t[0][0, 0]) for t in told]
+    found = max((_correlated(surfaces, alone, True, order=k) for k in orders), key=lambda f: f.likelihood)
     if 2 * (found.likelihood - white.likelihood) <= GAIN:
         return replace(white, apart=found.apart)
     if not surfaces[0].capped:
         return found
-    recorded = _correlated(surfaces, [-math.inf] * len(surfaces), False, near=found)
+    recorded = _correlated(surfaces, [-math.inf] * len(surfaces), False, near=found, order=found.order)
     if 2 * (found.likelihood - recorded.likelihood) > GAIN * len(surfaces):
         return found
     return replace(recorded, apart=found.apart)
 
 
-def _correlated(surfaces: Sequence[_Surface], white: Sequence[float], free: bool, near: _Found | None = None) -> _Found:
+def _correlated(
+    surfaces: Sequence[_Surface], white: Sequence[float], free: bool, near: _Found | None = None, order: int = 1
+) -> _Found:
     """The share and the time of highest likelihood, on ever narrower grids.
 
     Args:
@@ -196,7 +207,7 @@ def _correlated(surfaces: Sequence[_Surface], white: Sequence[float], free: bool
     best, apart = _Found(0.0, 1.0, -math.inf, []), None
     for _ in range(ROUNDS if near is None else ROUNDS - 1):
         shares = np.minimum(1 / (1 + np.exp(-logits)), 1 - NEVER_WHITE)
-        told = [s(shares, np.exp(logs), s.walks(*r, WALKS), free) for s, r in zip(surfaces, ranges)]
+        told = [s(shares, np.exp(logs), s.walks(*r), free, order) for s, r in zip(surfaces, ranges)]
         total = sum(t[0] for t in told)
         i, j = np.unravel_index(np.argmax(total), total.shape)
         if apart is None:
@@ -204,7 +215,7 @@ def _correlated(surfaces: Sequence[_Surface], white: Sequence[float], free: bool
             apart = own - max(float(total[i, j]), sum(white))
         if total[i, j] > best.likelihood:
             levels = [math.sqrt(t[2][i, j]) for t in told]
-            best = _Found(float(shares[i]), float(math.exp(logs[j])), float(total[i, j]), levels, apart)
+            best = _Found(float(shares[i]), float(math.exp(logs[j])), float(total[i, j]), levels, apart, order)
         ranges = [_narrowed(r, float(t[1][i, j])) for r, t in zip(ranges, told)]
         logits = _around(logits, i)
         logs = _around(logs, j)
@@ -260,4 +271,48 @@ def _filter(steps, y, seen, turns, share, tau, walk, diffuse, span):
     return jax.lax.scan(advance, first, (steps, y, seen, turns))[0][2:]
 
 
+def _filter_twice(steps, y, seen, turns, share, tau, walk, diffuse, span):
+    """The same behind a low-pass of second order: states u, tau times its rate, a, b; covariances (4, 4, trials)."""
+    one, none = jnp.ones_like(share), jnp.zeros_like(share)
+
+    def whole(rows):
+        return jnp.stack([jnp.stack([none + x for x in row]) for row in rows])
+
+    def advance(carry, now):
+        mean, spread, logs, squares = carry
+        dt, value, there, turn = now
+        kept = jnp.where(turn, jnp.array([1.0, 1.0, 1.0, 0.0]), 1.0)
+        mean, spread = mean * kept[:, None], spread * (kept[:, None] * kept[None, :])[:, :, None]
+        spread = spread.at[3, 3].set(jnp.where(turn, diffuse / span**2, spread[3, 3]))
+        seen_by = spread[:, 0] + spread[:, 2]
+        variance = seen_by[0] + seen_by[2] + 1 - share
+        error = jnp.where(there, value - mean[0] - mean[2], 0.0)
+        gain = jnp.where(there, 1 / variance, 0.0)
+        logs = logs + jnp.where(there, jnp.log(variance), 0.0)
+        squares = squares + gain * error**2
+        mean = mean + gain * seen_by * error
+        spread = spread - gain * seen_by[:, None] * seen_by[None, :]
+        d = dt / tau
+        e = jnp.exp(-d)
+        move = whole([[e * (1 + d), e * d, 0, 0], [-e * d, e * (1 - d), 0, 0], [0, 0, one, dt], [0, 0, 0, one]])
+        # 1 - move move' of the low-pass, written so that nothing cancels where d is small
+        w = -jnp.expm1(-2 * d)
+        uu, uv, vv = w - 2 * d * (1 + d) * e**2, 2 * d**2 * e**2, w + 2 * d * (1 - d) * e**2
+        fresh = whole([
+            [share * uu, share * uv, 0, 0],
+            [share * uv, share * vv, 0, 0],
+            [0, 0, walk * dt**3 / 3, walk * dt**2 / 2],
+            [0, 0, walk * dt**2 / 2, walk * dt],
+        ])  # fmt: skip
+        mean = jnp.einsum("ijt,jt->it", move, mean)
+        spread = jnp.einsum("ijt,jkt,lkt->ilt", move, spread, move) + fresh
+        return (mean, spread, logs, squares), None
+
+    start = whole([
+        [share, 0, 0, 0], [0, share, 0, 0], [0, 0, none + diffuse, 0], [0, 0, 0, none + diffuse / span**2],
+    ])  # fmt: skip
+    return jax.lax.scan(advance, (jnp.zeros((4, len(share))), start, none, none), (steps, y, seen, turns))[0][2:]
+
+
 _filtered = Kept(_filter, "estimation.correlation._filter")
+_filtered_twice = Kept(_filter_twice, "estimation.correlation._filter_twice")

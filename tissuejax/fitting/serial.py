@@ -52,7 +52,8 @@ def serial(problem: Problem, residuals: Float[np.ndarray, " n"]) -> Serial:
         columns = [(rows, time) for rows, time in columns if len(rows) >= LEAST]
         if not any(_noticed(residuals[rows]) for rows, _ in columns):
             continue
-        found = estimate([Series(time, residuals[rows][:, None]) for rows, time in columns], recorded=False)
+        series = [Series(time, residuals[rows][:, None]) for rows, time in columns]
+        found = estimate(series, recorded=False, orders=(1, 2), mismatch=False)
         parts += [
             (rows, time, noise)
             for (rows, time), noise in zip(columns, found.noises, strict=True)
