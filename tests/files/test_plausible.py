@@ -86,6 +86,7 @@ def test_the_demonstration_passes():
 
 
 UNUSABLE = {
+    "absurd": ({"r": recording(stress=1e300 * STRESS)}, "nothing that is measured exceeds"),
     "dead": ({"r": recording(stress=np.zeros(N))}, "zero throughout"),
     "nothing done": ({"r": recording(stretch=np.ones(N), stress=np.full(N, 5.0))}, "nothing to fit"),
     "two rows": ({"r": recording(time=np.arange(2.0))}, "2 samples"),

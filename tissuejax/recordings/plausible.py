@@ -16,6 +16,7 @@ from tissuejax.recordings.recording import Recording, Sample
 STRETCH = (0.2, 4.0)  # what soft tissue bears
 STRESS = (1.0, 1e8)  # Pa: below, no cell measures it; above, it is steel's
 FEW = 10  # samples
+ABSURD = 1e20  # SI: squares and their sums stay far from overflow, and nothing measured is near
 RUN = 5  # equal samples in a row at the largest value: a sensor at its end
 GAP = 20.0  # times the usual step
 FILTERED = 2.0  # noise seen eight samples apart over noise seen between neighbours
@@ -41,7 +42,7 @@ def refuse_unusable(sample: Sample, names: Iterable[str]) -> None:
     """Refuse recordings that a fit can learn nothing from.
 
     Raises:
-        InputError: fewer than three samples, a channel that reads zero throughout, one that never changes while
+        InputError: fewer than three samples, values beyond 1e20, a channel that reads zero throughout, one that never changes while
             nothing is done either, or a noise level of zero beside recordings with noise.
     """
     names = tuple(names)
@@ -55,6 +56,11 @@ def refuse_unusable(sample: Sample, names: Iterable[str]) -> None:
                     "model from noise: leave it out, or record more"
                 )
             seen = values[np.isfinite(values)]
+            if len(seen) and np.max(np.abs(seen)) > ABSURD:
+                raise InputError(
+                    f"recording {name}: {key} reaches {np.max(np.abs(seen)):.3g} {channel.unit}; nothing that is measured "
+                    f"exceeds {ABSURD:.0e}: check the unit and the column"
+                )
             if key != "markers" and len(seen) and not seen.any():
                 raise InputError(
                     f"recording {name}: {key} is zero throughout: the sensor was dead or the wrong column was read; "
