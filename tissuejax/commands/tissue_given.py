@@ -59,6 +59,10 @@ def tissue(given: argparse.Namespace) -> Tissue:
         if sample.geometry is None:
             raise InputError(f"{file}: it has no body (/geometry); name one with --sample, or give a --slab")
         lobe, density = lobe_of(sample), sample.density or density
+        if name is not None and "probe/edge" in probings[name].attributes:
+            raise InputError(
+                f"{file}: {name} was probed with a flat punch; surrogates are of balls: name --radius alone"
+            )
         if radius is None and name is not None:
             radius = 1e3 * float(probings[name].attributes.get("probe/radius", np.nan))
     if given.slab is not None:

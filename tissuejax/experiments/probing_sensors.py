@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from tissuejax.errors import InputError
 from tissuejax.mesh.facets import Facets, triangles
 from tissuejax.recordings.recording import Recording
+from tissuejax.tled.shapes import Shape, Sphere
 
 INSIDE = 1e-3  # m: a probe that starts deeper than this starts inside the tissue
 FEWEST = 5  # frames out of contact that give a marker its rest position
@@ -34,13 +35,22 @@ def smooth_path(recording: Recording, width: float) -> tuple[Float[np.ndarray, "
 
 
 def surface_gap(
-    path: Float[np.ndarray, "n 3"], radius: float, points: Float[np.ndarray, "N 3"], facets: Facets
+    path: Float[np.ndarray, "n 3"], tip: Shape, points: Float[np.ndarray, "N 3"], facets: Facets
 ) -> Float[np.ndarray, " n"]:
-    """Distance of the ball from the undeformed surface along its path, m; negative inside."""
+    """Distance of the tip from the undeformed surface along its path, m; negative inside."""
     corners = np.asarray(points)[triangles(facets.nodes)]
     bary = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4
     dots = np.einsum("qc,fcd->fqd", bary, corners).reshape(-1, 3)
-    return cKDTree(dots).query(path)[0] - radius
+    if isinstance(tip, Sphere):
+        return cKDTree(dots).query(path)[0] - float(tip.radius)
+    away = cKDTree(path).query(dots)[0]
+    dots = dots[away < max(3 * float(tip.reach()), float(away.min()) + float(tip.reach()))]
+
+    def least(at):
+        return jnp.min(tip.distance(tuple(dots.T - at[:, None]))[0])
+
+    with jax.enable_x64(True):
+        return np.asarray(jax.jit(lambda path: jax.lax.map(least, path))(np.asarray(path, float)))
 
 
 class Contact(NamedTuple):

@@ -31,7 +31,7 @@ from tissuejax.model import Model
 from tissuejax.recordings.recording import Geometry, Recording, Sample
 from tissuejax.tled.build import element, probe
 from tissuejax.tled.scene import Body, Clock, Markers, Probe, Scene, Settings, Support, Tissue
-from tissuejax.tled.shapes import Sphere
+from tissuejax.tled.shapes import Punch, Shape, Sphere
 
 DENSITY = 1060.0  # kg/m^3, soft tissue: inertia is nothing in a probing, so a guess serves where none is recorded
 # What differs between recordings is padded to multiples of these, so that they share one compiled program
@@ -81,7 +81,7 @@ def setups(model: Model, sample: Sample, names: Sequence[str], settings: Probing
     for name, recording in every.items():
         _check_clocks(recording)
         time, path = smooth_path(recording, settings.smoothing)
-        gaps[name] = surface_gap(path, _radius(recording), given.points, top)
+        gaps[name] = surface_gap(path, _tip(recording), given.points, top)
         touch[name] = contact_span(name, time, gaps[name], path[0])
     rest = _rest(every, touch)
     out = {}
@@ -114,6 +114,19 @@ def _radius(recording: Recording) -> float:
     if "probe/radius" not in recording.attributes:
         raise InputError(f"recording {recording.name}: no probe/radius; give the radius of the tip in metres")
     return float(recording.attributes["probe/radius"])
+
+
+def _tip(recording: Recording) -> Shape:
+    """A ball, or where the recording has a `probe/edge` a flat punch with an edge so rounded."""
+    radius, edge = _radius(recording), recording.attributes.get("probe/edge")
+    if edge is None:
+        return Sphere(np.asarray(radius))
+    if not 0 < float(edge) < radius:
+        raise InputError(
+            f"recording {recording.name}: probe/edge = {1e3 * float(edge):.3g} mm; the edge of a flat punch is rounded "
+            f"by more than 0 and less than its radius, {1e3 * radius:.3g} mm"
+        )
+    return Punch(np.asarray(radius), np.asarray(float(edge)))
 
 
 def _check_clocks(recording: Recording) -> None:
@@ -187,8 +200,7 @@ def _setup(model, sample, recording, settings, lobe: Lobe | None, touch: Contact
         None,
         on,
     )
-    ball = Sphere(np.asarray(radius))
-    tip = probe(bare, ball, *_padded_path(time, path), near, settings.penalty, settings.softness)
+    tip = probe(bare, _tip(recording), *_padded_path(time, path), near, settings.penalty, settings.softness)
     scene = eqx.tree_at(lambda s: s.probe, bare, _widened(tip), is_leaf=lambda x: x is None)
     test = ProbingTest(
         start=np.asarray(float(recording.attributes.get("start", 0.0))),

@@ -40,7 +40,7 @@ from tissuejax.recordings.recording import Channel, Recording, Sample
 from tissuejax.units import factor, quantity
 
 WHOLE = ("sample", "density", "gravity", "source", "notes", "body", "probing", "registration")
-PART = ("recording", "radius", "start", "probe", "force", "markers", "table")
+PART = ("recording", "radius", "edge", "start", "probe", "force", "markers", "table")
 GRAVITY = 9.80665  # m/s^2, standard acceleration of gravity
 
 
@@ -149,6 +149,8 @@ def _recordings(
         channels["markers"] = Channel(markers.time, moved + up, "m", _noise(markers, "m", "markers"))
     position = probe.values if rigid is None else rigid(probe.values)
     attributes: dict[str, object] = {"probe/radius": radius}
+    if "edge" in part:
+        attributes["probe/edge"] = quantity(part["edge"], "m", "probing.edge")
     if "start" in part:
         attributes["start"] = quantity(part["start"], "s", "probing.start")
     inputs = {"probe/time": probe.time, "probe/position": position + up}

@@ -106,7 +106,8 @@ LAYOUTS: dict[str, tuple[Item, ...]] = {
     ),
 }
 SCALARS: dict[str, tuple[Scalar, ...]] = {
-    "probing": (Scalar("radius", "m", "probe", optional=False),),
+    # a tip with an edge is a flat punch, one without is a ball
+    "probing": (Scalar("radius", "m", "probe", optional=False), Scalar("edge", "m", "probe")),
     "cutting": (Scalar("thickness", "m", "blade", optional=False),),
 }
 SPECIMEN = (Scalar("area", "m^2"), Scalar("height", "m"), Scalar("diameter", "m"))

@@ -42,8 +42,8 @@ def refuse_unusable(sample: Sample, names: Iterable[str]) -> None:
     """Refuse recordings that a fit can learn nothing from.
 
     Raises:
-        InputError: fewer than three samples, values beyond 1e20, a channel that reads zero throughout, one that never changes while
-            nothing is done either, or a noise level of zero beside recordings with noise.
+        InputError: fewer than three samples, values beyond 1e20, a channel that reads zero throughout, one that never
+            changes while nothing is done either, or a noise level of zero beside recordings with noise.
     """
     names = tuple(names)
     for name in names:
@@ -58,8 +58,8 @@ def refuse_unusable(sample: Sample, names: Iterable[str]) -> None:
             seen = values[np.isfinite(values)]
             if len(seen) and np.max(np.abs(seen)) > ABSURD:
                 raise InputError(
-                    f"recording {name}: {key} reaches {np.max(np.abs(seen)):.3g} {channel.unit}; nothing that is measured "
-                    f"exceeds {ABSURD:.0e}: check the unit and the column"
+                    f"recording {name}: {key} reaches {np.max(np.abs(seen)):.3g} {channel.unit}; nothing that is "
+                    f"measured exceeds {ABSURD:.0e}: check the unit and the column"
                 )
             if key != "markers" and len(seen) and not seen.any():
                 raise InputError(

@@ -25,7 +25,7 @@ from tissuejax.recordings.recording import Geometry
 from tissuejax.tled import pressed
 from tissuejax.tled.contact import quadrature
 from tissuejax.tled.scene import Body, Clock, Markers, Probe, Scene, Settings, Support, Tissue
-from tissuejax.tled.shapes import Hemisphere, Platen, Shape, Sphere
+from tissuejax.tled.shapes import Hemisphere, Platen, Punch, Shape, Sphere
 from tissuejax.tled.stable import critical_steps
 
 SAFETY = 0.7
@@ -298,4 +298,4 @@ def _refuse_inside(made: Probe, points, start):
         )
 
 
-__all__ = ["Hemisphere", "Platen", "Sphere", "scene", "element", "probe", "steps"]
+__all__ = ["Hemisphere", "Platen", "Punch", "Sphere", "scene", "element", "probe", "steps"]

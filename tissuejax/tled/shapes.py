@@ -62,6 +62,32 @@ class Hemisphere(Shape):
         return self.radius
 
 
+class Punch(Shape):
+    """A flat-ended cylinder that points down (-z), its edge rounded: |max(q, 0)| + min(max q, 0) - edge.
+
+    q = (rho - R + edge, edge - R - z) of a point at rho from the axis. The reference point lies one radius above the
+    middle of the face, as a ball's centre lies above its tip.
+    """
+
+    name: ClassVar[str] = "punch"
+    radius: Float[Array, ""] | float
+    edge: Float[Array, ""] | float
+
+    def distance(self, x: Vector) -> tuple[Array, Vector]:
+        rho = _length(x[0], x[1])
+        safe = jnp.where(rho > 0, rho, 1.0)
+        side, below = rho - (self.radius - self.edge), self.edge - self.radius - x[2]
+        out = _length(jnp.maximum(side, 0.0), jnp.maximum(below, 0.0))
+        reached = jnp.where(out > 0, out, 1.0)
+        sideways = jnp.where(out > 0, jnp.maximum(side, 0.0) / reached, jnp.where(side > below, 1.0, 0.0))
+        down = jnp.where(out > 0, jnp.maximum(below, 0.0) / reached, jnp.where(side > below, 0.0, 1.0))
+        gap = out + jnp.minimum(jnp.maximum(side, below), 0.0) - self.edge
+        return gap, (sideways * x[0] / safe, sideways * x[1] / safe, -down)
+
+    def reach(self) -> Any:
+        return self.radius
+
+
 class Platen(Shape):
     """A flat platen that fills the half space above its reference point: -z; it pushes down."""
 
