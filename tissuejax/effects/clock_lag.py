@@ -29,7 +29,7 @@ class ClockLag(Effect):
     blind: ClassVar[str] = "ramps at one rate without holds; holds alone; probings without markers"
     words: ClassVar[tuple[str, ...]] = ("the clocks are {lag} apart",)
     needs: ClassVar[str] = "rates"
-    misjudged: ClassVar[Mapping[str, float]] = {"lag": 0.2}
+    misjudged: ClassVar[Mapping[str, float]] = {"lag": 0.05}  # of one controller: its filters, a few samples
     source: ClassVar[str] = "Lister 2012, 2.2.1 (force at 62.5 Hz and cameras at 15 Hz on separate clocks)"
     amplitudes: ClassVar[tuple[str, ...]] = ("lag",)
     order: ClassVar[int] = 0
