@@ -115,7 +115,7 @@ class Population:
     def record(self) -> dict:
         """For JSON: mean and spreads with 95 % intervals; spreads of logarithms are relative."""
 
-        def told(draws: np.ndarray) -> dict[str, dict[str, float | list[float]]]:
+        def quantiles(draws: np.ndarray) -> dict[str, dict[str, float | list[float]]]:
             return {
                 path: {"median": float(np.median(d)), "95 %": np.quantile(d, [0.025, 0.975]).tolist()}
                 for path, d in zip(self.of.paths, draws.T, strict=True)
@@ -128,10 +128,10 @@ class Population:
             "specimens": len(self.of.samples),
             "groups": list(self.of.labels),
             "logarithm": dict(zip(self.of.paths, self.of.positive.tolist(), strict=True)),
-            "typical": told(self.of.natural(self.mean)),
-            "between_specimens": told(sd),
-            "between_groups": told(groups) if self.of.groups else {},
-            "new_specimen": told(new),
+            "typical": quantiles(self.of.natural(self.mean)),
+            "between_specimens": quantiles(sd),
+            "between_groups": quantiles(groups) if self.of.groups else {},
+            "new_specimen": quantiles(new),
             "pooled": {p: [float(v), float(s)] for p, v, s in zip(self.of.paths, *pooled(self.of), strict=True)},
             "divergences": self.divergences,
             "rhat": self.rhat,

@@ -7,7 +7,7 @@ from typing import ClassVar
 import tissuejax.commands as package
 from tissuejax import verbs
 from tissuejax.commands.command import Command, Reply
-from tissuejax.commands.diagnose import told
+from tissuejax.commands.diagnose import diagnosed
 from tissuejax.commands.fitting import SUSPECT, reply
 from tissuejax.errors import InputError
 from tissuejax.progress import for_terminal
@@ -53,7 +53,7 @@ Read the pages in a browser.
             if answer.code != SUSPECT:  # the second can't be fitted: that is what it is there for
                 code = max(code, answer.code)
         found = verbs.diagnose(sample, ENERGY, holdout=HELD, progress=for_terminal())
-        answer = told(found, verbs.write(found, given.out / "diagnosis"))
+        answer = diagnosed(found, verbs.write(found, given.out / "diagnosis"))
         texts += [f"== what is missing in {folder / name}.h5", "", answer.text, ""]
         record["diagnosis"] = answer.record
         return Reply(record, "\n".join(texts).rstrip(), code)

@@ -83,7 +83,7 @@ tests and cuts begin anew.
             keep=out / "runs",
             known=given.known,
         )
-        return told(found, write_diagnosis(found, out))
+        return diagnosed(found, write_diagnosis(found, out))
 
 
 def _only(sample: Sample, only: list[str], holdout: list[str] | None) -> Sample:
@@ -97,7 +97,7 @@ def _only(sample: Sample, only: list[str], holdout: list[str] | None) -> Sample:
     return eqx.tree_at(lambda s: s.recordings, sample, kept, is_leaf=lambda x: isinstance(x, dict))
 
 
-def told(found: Diagnosis, written: dict[str, Path]) -> Reply:
+def diagnosed(found: Diagnosis, written: dict[str, Path]) -> Reply:
     """The verdict as text and as the record of `--json`."""
     lines = [headline(found), "", f"Verdict: {found.verdict.kind}. {judged.lead(found)}", ""]
     lines += [f"  {r['path']:<40}{r['value']:>24} {r['unit']:<6}{r['note']}" for r in sentences.parameters(found)]

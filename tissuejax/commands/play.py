@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from tissuejax.commands.command import Command, Reply
-from tissuejax.commands.precompute import counts_of, place_of, told
+from tissuejax.commands.precompute import counts_of, described, place_of
 from tissuejax.commands.tissue_given import Tissue, add_tissue, lobe_of, model_of_record, tissue
 from tissuejax.errors import InputError
 from tissuejax.play import blob, haply, haptics, page, replay
@@ -107,7 +107,7 @@ def _model(made: Precomputed, given: argparse.Namespace) -> dict:
     if given.replay is not None:
         sample, name, lobe = _sample(given)
         beside = replay.for_page(made.surrogate, sample.recordings[name], lobe)
-    return blob.of_surrogate(made, told(made.record)[1:], beside)
+    return blob.of_surrogate(made, described(made.record)[1:], beside)
 
 
 def _export(made: Precomputed, given: argparse.Namespace) -> Reply:
@@ -137,7 +137,7 @@ def _haptics(made: Precomputed, given: argparse.Namespace) -> Reply:
         return Reply(record, f"{record['answered']} forces at {record['rate_Hz']:.0f} Hz; not real time (Python)")
     port = haptics.port_of(given.haptics)
     found = haptics.loop(made.surrogate, port, seconds, given.rate, given.force_limit, given.slew_limit)
-    return Reply(found.record, haptics.told(found.record))
+    return Reply(found.record, haptics.summary(found.record))
 
 
 def _replayed(made: Precomputed, given: argparse.Namespace) -> Reply:

@@ -77,10 +77,12 @@ command is given again. Softening, a moving or sliding base and escaping fluid c
         store.write(made, out)
         shutil.rmtree(keep, ignore_errors=True)
         record = made.record | {"file": str(out), "bytes": out.stat().st_size}
-        return Reply(record, "\n".join([*told(made.record), f"file     {out} ({out.stat().st_size / 1e6:.1f} MB)"]))
+        return Reply(
+            record, "\n".join([*described(made.record), f"file     {out} ({out.stat().st_size / 1e6:.1f} MB)"])
+        )
 
 
-def told(record: dict) -> list[str]:
+def described(record: dict) -> list[str]:
     """What a surrogate is and how wrong, in lines."""
     box, wrong, own = record["box"], record["error"], record["numerical"]
     wide = [1e3 * (b - a) for a, b in zip(box["low_m"], box["high_m"])]

@@ -174,7 +174,7 @@ class Bench(abc.ABC):
         """A prediction in SI units."""
         return prediction
 
-    def burden(self, keys: Sequence[str]) -> int:
+    def nested(self, keys: Sequence[str]) -> int:
         """How many searches and memories a prediction with these candidates nests; sets of many are not tried."""
         return 0
 

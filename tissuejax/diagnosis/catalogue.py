@@ -40,7 +40,7 @@ SPARE = {  # principal stretches cost as much as all the rest, a second family h
     "energy-form": EnergyForm(terms=("C30", "C01", "C02", "exponential")),
     "anisotropy": Anisotropy(),
 }
-DEAR = ("machine-compliance", "nonlinear-viscosity", "compressibility")  # a search inside every prediction
+SEARCHED = ("machine-compliance", "nonlinear-viscosity", "compressibility")  # a search inside every prediction
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Entry:
     """An effect with its forms, spare to rich, and the name under which it is reported.
 
     Attributes:
-        spare: the effect without what makes every prediction dear, for sets that don't use that.
+        spare: the effect without what makes every prediction a search, for sets that don't use that.
     """
 
     effect: Effect
@@ -82,9 +82,9 @@ class Entry:
     spare: Effect | None = None
 
     @property
-    def dear(self) -> bool:
+    def searches(self) -> bool:
         """Whether it turns every prediction into a search."""
-        return self.effect.name in DEAR or not self.effect.isotropic
+        return self.effect.name in SEARCHED or not self.effect.isotropic
 
     def declare(
         self, model: Model, fitted: tuple[str, ...], held_out: tuple[str, ...]

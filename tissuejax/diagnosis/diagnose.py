@@ -142,7 +142,7 @@ def diagnose(
     # matrices are thin here: threads of the linear algebra would wait for each other and keep a core from the rest
     with (progress or Silent()).stage(f"diagnosing {sample.name}") as stage, threadpool_limits(1, "blas"):
 
-        def told(note: str) -> None:
+        def noted(note: str) -> None:
             stage.advance(note=note)
 
         if kind == "probing":
@@ -154,7 +154,7 @@ def diagnose(
             alike = modes(whole) if homogeneous else dict.fromkeys(every, kind)
             seen = series(whole, cut, alike, held_strains(whole) if homogeneous else None)
             of = discrepancy(seen, cut.spread(whole.sigma))
-        found = answer(bench, whole, cut, of, effort, told)
+        found = answer(bench, whole, cut, of, effort, noted)
         made = {"homogeneous": _material, "probing": _probing, "cutting": _cutting}[kind](sample, energy, base, found)
     if found.evidence.exhausted:
         found.bench.warnings.append(

@@ -164,8 +164,8 @@ class MaterialBench(Bench):
         self._energy, self._entries = energy, found
         self._built: dict[tuple[str, ...], Program] = {}
         self._full = [e.effect for e in found if e.spare is not None]
-        self._dear = {e.effect.name for e in found if e.dear}
-        heavy = self._dear.union(MEMORIES)
+        self._searched = {e.effect.name for e in found if e.searches}
+        heavy = self._searched.union(MEMORIES)
         self._heavy = {f"effects.{e.effect.name}.": e.effect.name for e in found if e.effect.name in heavy}
         whole = Model(energy, None, tuple(e.effect for e in found)).across(recordings)
         self._rich = {
@@ -304,8 +304,8 @@ class MaterialBench(Bench):
                         self._put(out[i], name, known[after] - known[before])
         return out.T
 
-    def burden(self, keys: Sequence[str]) -> int:
-        """See `Bench.burden`: memories run side by side and count once."""
+    def nested(self, keys: Sequence[str]) -> int:
+        """See `Bench.nested`: memories run side by side and count once."""
         paths = [p for key in keys for p in self.candidates[key].paths]
         heavy = {d for p in paths for prefix, d in self._heavy.items() if p.startswith(prefix)}
         rich = any(self._rich.get(p, "anisotropy") != "anisotropy" for p in paths)

@@ -117,7 +117,7 @@ def described(late, spent, rate: float, took: float, real: bool, locked: bool) -
     }
 
 
-def told(record: dict) -> str:
+def summary(record: dict) -> str:
     """The record in lines."""
     late, spent = record["lateness_ms"], record["evaluation_us"]
     return "\n".join([

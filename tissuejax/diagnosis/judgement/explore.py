@@ -42,7 +42,7 @@ class Effort:
         reshaped: sets that are tried in all their forms, by size.
         starts: settings of the shapes that a set is begun from.
         spend: cost of all predictions (of the plain base model each) after which nothing new is begun.
-        burden: searches and memories nested in a prediction at most.
+        nested: searches and memories nested in a prediction at most.
         rounds, iterations: of fit and amplitudes in turn, and of a fit.
         stepwise: a second effect is sought only where a first one has come in.
     """
@@ -55,7 +55,7 @@ class Effort:
     reshaped: tuple[int, ...] = (2, 1, 0)
     starts: int = 2
     spend: float = 4e4
-    burden: int = 2
+    nested: int = 2
     rounds: int = ROUNDS
     iterations: int = 12
     stepwise: bool = False
@@ -168,7 +168,7 @@ class Exploration:
             if c.name not in names
             and c.nominated
             and c.amplitudes
-            and self.bench.burden((*key, c.key)) <= self.effort.burden
+            and self.bench.nested((*key, c.key)) <= self.effort.nested
         ]
         values, bench, scales = at.refit.values, self.bench, self.scales
         prediction = at.refit.prediction
@@ -259,7 +259,7 @@ class Exploration:
             for old in parent.evidence.keys:
                 for new in self.bench.candidates[old].beside:
                     order = tuple(new if k == old else k for k in parent.evidence.keys)
-                    known = frozenset(order) in self.weighed or self.bench.burden(order) > self.effort.burden
+                    known = frozenset(order) in self.weighed or self.bench.nested(order) > self.effort.nested
                     if known or (len(order) > 1 and self.lost(new)):
                         continue
                     starts = [{**parent.refit.values, **s} for s in self.bench.candidates[new].grid]
