@@ -18,6 +18,7 @@ from tissuejax.surrogate.surrogate import Memory, Rig, Surface, Surrogate
 
 RADIUS, DEPTH, TOP = 5e-3, 6e-3, 0.03
 BOX = Box(np.array([-0.01, -0.008]), np.array([0.01, 0.008]), DEPTH, (6, 5), 8)
+SLIP = (0.2, 0.1, 0.15)
 STIFF, LEAN = 300.0, 20.0  # N / m^1.5 and per metre
 
 
@@ -61,7 +62,7 @@ def formula(g=(), tau=(), friction=0.0, strength=0.0) -> Surrogate:
     surface = Surface((1, 1, 0), shape, np.ones((2, 4, 3)), field(lambda x, y: 1 + 0 * x, plan, BOX.spacing, BOX.low),
         rest[None], field(lambda x, y: (0 * x, 1 + 0 * x, 0 * x, 1 + 0 * x), plan, BOX.spacing, BOX.low),
     )  # fmt: skip
-    rub = drag.Rub(*(np.asarray(v) for v in (friction, 0.0, strength, 2e-4)))
+    rub = drag.Rub(*(np.asarray(v) for v in (friction, 0.0, strength, 2e-4)), np.array(SLIP))
     rig = Rig(np.zeros(3), np.asarray(0.0), np.asarray(0.0))
     return Surrogate(
         BOX.low, BOX.high, np.asarray(DEPTH), np.asarray(RADIUS), touch, law, surface, memory, rub, rig, np.asarray(1.0)

@@ -133,7 +133,7 @@ def test_a_bad_force_file_is_refused(tmp_path):
 
     assert said(good) == "opened"
     assert said(good[: len(good) // 2]) == "cut off or damaged"
-    assert said(b"TJFORCE2" + good[8:]).startswith("not a tissuejax force file")
+    assert said(b"TJFORCE1" + good[8:]).startswith("not a tissuejax force file")
     assert said(good[:-8] + struct.pack("<d", float("nan"))) == "cut off or damaged"
     assert said(good[:8] + struct.pack("<i", 99) + good[12:]) != "opened"
 

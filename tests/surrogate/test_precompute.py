@@ -1,6 +1,7 @@
 """From statics to a file: held-out errors, resuming, the file's guards, and what is refused."""
 
 import h5py
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -11,7 +12,9 @@ from tissuejax.surrogate import store
 from tissuejax.surrogate.live.ask import Asker
 from tissuejax.surrogate.places import Box, checked, first_contact, whole_top
 from tissuejax.surrogate.precompute import precompute
+from tissuejax.surrogate.ramp import scene_at, slip
 from tissuejax.surrogate.site_mesh import Grid, lines
+from tissuejax.surrogate.tabulate import slip_fitted
 
 
 def test_first_contact_of_a_sphere_on_a_sphere():
@@ -157,3 +160,30 @@ def test_a_failed_site_says_place_and_depth(monkeypatch):
     monkeypatch.setattr(ramps, "MOST", 25)
     with pytest.raises(NotConverged, match=r"place \(1.0, 2.0\) mm, depth"):
         ramps.ramp(made.matter(), made.SMALL, [1e-3, 2e-3], 0.018, [1e-3])
+
+
+def test_friction_takes_the_stretch_of_the_surface_along_the_way():
+    """Surface stretched by 1.3 along x and 1.1 along y under a ball of 1 m: the mean of both. Unstretched, a small
+    ball deep in it: forces over their vertical sum, from points of a sphere."""
+    place, radius = np.zeros(2), made.matter().radius
+    top = float(made.SLAB.top(0.5, 0.5)[0, 0])
+    scene = scene_at(made.matter(), made.SMALL, place, top + radius)
+    points = np.asarray(scene.body.points)
+    stretched = points * np.array([0.3, 0.1, 0.0])
+    flat = scene.put({"probe.shape.radius": jnp.asarray(1.0)})
+    shallow = float(slip(flat, jnp.asarray(stretched), jnp.array([0.0, 0.0, top + 1.0 - 1e-4])))
+    assert shallow == pytest.approx(1.2, abs=1e-3)
+    cap = np.array([[0.0, 0.0, top + radius - 1e-3]])
+    deep = float(slip(scene, jnp.asarray(0 * points), jnp.asarray(cap[0])))
+    rho = np.linspace(0, np.sqrt(radius**2 - (radius - 1e-3) ** 2), 4001)
+    gap = radius - np.hypot(rho, radius - 1e-3)
+    up = (radius - 1e-3) / np.hypot(rho, radius - 1e-3)
+    assert deep == pytest.approx(np.trapezoid(gap * rho, rho) / np.trapezoid(gap * up * rho, rho), rel=0.02)
+
+
+def test_slip_is_fitted_over_the_depth():
+    q = np.linspace(0.1, 1, 8)
+    wanted = np.array([0.3, -0.1, 0.25])
+    slips = np.tile(1 + q * (wanted[0] + q * (wanted[1] + q * wanted[2])), (5, 1))
+    slips[2, 0] = np.inf  # a site that was not touched
+    np.testing.assert_allclose(slip_fitted(q, slips), wanted, atol=1e-10)

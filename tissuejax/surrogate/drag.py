@@ -1,8 +1,15 @@
 """Friction and adhesion of the ball on top of a surrogate's force.
 
-Friction: one tangential spring between ball and tissue that slides at the Coulomb limit. Its stiffness is the tissue's
-own against a sideways pull, 2 (1 - nu) / (2 - nu) = 2/3 of the normal one (Mindlin 1949, incompressible), in series
-with what `give` says. When the spring stiffens it keeps its force, when it softens its length: it never gains energy.
+Friction: one tangential spring between ball and tissue that slides at a limit. Its stiffness is the tissue's own
+against a sideways pull, 2 (1 - nu) / (2 - nu) = 2/3 of the normal one (Mindlin 1949, incompressible), in series with
+what `give` says. Its limit is that of steady sliding, in which the hand's power is what friction takes: tissue passes a
+point of contact as much faster than the ball moves as its surface is stretched there, so
+
+    limit = mu sum_i f_i |F_i e| = mu N slip(d),    slip(d) = 1 + q (c_1 + q (c_2 + q c_3)),   q = d / D,
+
+f_i the contact forces normal to the ball, N their vertical sum and F_i e the deformed surface along the way; the three
+numbers are fitted to the equilibria that are tabulated (`ramp.slip`). When the spring stiffens it keeps its force, when
+it softens its length: it never gains energy.
 
 Adhesion: bonds over the ring that has been touched pull back, sigma (g / reach) exp(1 - g / reach) at gap g. Around a
 ball (Derjaguin 1934) the ring sums up to 2 pi R times the integral of that over the gaps present, from the smallest
@@ -20,12 +27,13 @@ BREAK = 5.0  # gap over reach at which a bond is gone, as in `tled/contact.py`
 
 
 class Rub(eqx.Module):
-    """Coulomb coefficient and give (m/Pa); strength (Pa) and reach (m) of adhesion; zero for none."""
+    """Coulomb coefficient, give (m/Pa) and c_1 to c_3 (`slip`); strength (Pa) and reach (m) of adhesion; zero: none."""
 
     friction: Float[Array, ""]
     give: Float[Array, ""]
     strength: Float[Array, ""]
     reach: Float[Array, ""]
+    slip: Float[Array, "3"]
 
 
 class Grip(NamedTuple):
@@ -49,8 +57,13 @@ def pull(gap: Float[Array, ""], reach: Float[Array, ""]) -> Float[Array, ""]:
     return reach * (jnp.e - (1 + g) * jnp.exp(1 - g))
 
 
-def tick(rub: Rub, grip: Grip, at, depth, normal, stiffness, radius) -> tuple[Float[Array, "3"], Grip]:
-    """Force of friction and adhesion on the ball, N, and the memory."""
+def slipping(slip: Float[Array, "3"], q: Float[Array, ""]) -> Float[Array, ""]:
+    """slip(d) at q = d / D."""
+    return 1 + q * (slip[0] + q * (slip[1] + q * slip[2]))
+
+
+def tick(rub: Rub, grip: Grip, at, depth, normal, stiffness, radius, most) -> tuple[Float[Array, "3"], Grip]:
+    """Force of friction and adhesion on the ball, N, and the memory; `most` is the depth of the tables, m."""
     touching = depth > 0
     deepest = jnp.where(touching, jnp.maximum(grip.deepest, depth), grip.deepest)
     near = jnp.maximum(-depth, 0.0)
@@ -65,7 +78,7 @@ def tick(rub: Rub, grip: Grip, at, depth, normal, stiffness, radius) -> tuple[Fl
     keep = jnp.where(k > grip.stiffness, grip.stiffness / jnp.where(k > 0, k, 1.0), 1.0)
     stretch = grip.stretch * keep + at - grip.at
     length = jnp.sqrt(jnp.sum(stretch**2) + 1e-30)
-    limit = rub.friction * jnp.maximum(normal, 0.0)
+    limit = rub.friction * jnp.maximum(normal, 0.0) * slipping(rub.slip, jnp.clip(depth / most, 0.0, 1.0))
     slid = jnp.minimum(1.0, limit / jnp.maximum(k * length, 1e-30))
     stretch = jnp.where(touching & (k > 0), slid * stretch, 0.0)
     force = jnp.append(-k * stretch, adhesion)

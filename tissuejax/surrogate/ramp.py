@@ -28,6 +28,7 @@ from tissuejax.parameters import under
 from tissuejax.recordings.recording import Geometry
 from tissuejax.surrogate.site_mesh import Grid, geometry, topology
 from tissuejax.tled import build, internal, statics
+from tissuejax.tled import contact as touching
 from tissuejax.tled.scene import Body, Clock, Scene, Settings, Support, Tissue
 from tissuejax.tled.shapes import Sphere
 from tissuejax.tled.simulate import COMPILER_OPTIONS
@@ -56,6 +57,8 @@ class Ramp(NamedTuple):
         place: in plan, m. depth: below first contact, m.
         force: of the tissue on the ball, N. displacement: of the nodes from the settled shape, m.
         rest: nodes of the settled shape, m.
+        slip: sum of the normal contact forces times the surface's stretch along the way, over the vertical force: how
+            much more friction takes than the coefficient times that force.
         strain, stress: Green strain and isochoric second Piola-Kirchhoff stress at element centres, beyond those of
             the settled shape (xx, yy, zz, xy, xz, yz), Pa; empty where not wanted.
     """
@@ -65,6 +68,7 @@ class Ramp(NamedTuple):
     force: Float[np.ndarray, "k 3"]
     displacement: Float[np.ndarray, "k N 3"]
     rest: Float[np.ndarray, "N 3"]
+    slip: Float[np.ndarray, " k"]
     strain: Float[np.ndarray, "k E 6"]
     stress: Float[np.ndarray, "k E 6"]
 
@@ -135,6 +139,27 @@ def _fields(scene: Scene, u: Float[Array, "N 3"]):
     return jnp.stack(E, -1)[:count], jnp.stack(S, -1)[:count]
 
 
+@jax.jit
+def slip(scene: Scene, u: Float[Array, "N 3"], centre: Float[Array, "3"]) -> Float[Array, ""]:
+    """sum_i f_i (|F_i e_x| + |F_i e_y|) / 2 over the contact's vertical force on the ball; F_i maps the surface."""
+    patch = touching.patch(scene)
+    shape, _ = touching.quadrature(4)
+    gap, normal = scene.probe.shape.distance(touching.places(patch, u.T, centre, shape))
+    probe = scene.probe
+    f = probe.penalty * probe.softness * jax.nn.softplus(-gap / probe.softness) * probe.area
+    place = np.polynomial.legendre.leggauss(3)[0]
+    a, b = (g.ravel() for g in np.meshgrid(place, place))
+    slopes = (
+        np.stack([-(1 - b), 1 - b, 1 + b, -(1 + b)], -1) / 4,
+        np.stack([-(1 - a), -(1 + a), 1 + a, 1 - a], -1) / 4,
+    )
+    deformed = patch.x + u.T[:, patch.nodes]
+    before = jnp.stack([jnp.einsum("qv,ivp->qpi", w, patch.x[:2]) for w in slopes], -1)
+    after = jnp.stack([jnp.einsum("qv,ivp->qpi", w, deformed) for w in slopes], -1)
+    stretch = jnp.linalg.norm(after @ jnp.linalg.inv(before), axis=-2).mean(-1)
+    return jnp.sum(f * stretch) / jnp.maximum(-jnp.sum(f * normal[2]), 1e-300)
+
+
 _equilibrium = jax.jit(statics.equilibrium, compiler_options=COMPILER_OPTIONS, static_argnames=("most",))
 
 
@@ -156,7 +181,7 @@ def ramp(
     settled = internal.settled(scene).T
     rest = np.asarray(scene.body.points + settled)
     zero = _fields(scene, settled) if fields else None
-    force, displacement, strain, stress = [], [], [], []
+    force, displacement, slips, strain, stress = [], [], [], [], []
     last, before, at, earlier = settled, settled, 0.0, -1.0
     for depth in depths:
         count = max(1, int(np.ceil((depth - at) / STEP - 1e-9)))
@@ -176,13 +201,14 @@ def ramp(
             before, last, earlier, at = last, found.displacement, at, target
         force.append(np.asarray(found.force))
         displacement.append(np.asarray(last - settled))
+        slips.append(float(slip(scene, last, jnp.asarray([*place, contact - depth]))))
         if fields:
             E, S = _fields(scene, last)
             strain.append(np.asarray(E - zero[0]))
             stress.append(np.asarray(S - zero[1]))
     none = np.zeros((len(depths), 0, 6))
     return Ramp(
-        place, depths, np.array(force), np.array(displacement), rest,
+        place, depths, np.array(force), np.array(displacement), rest, np.array(slips),
         np.array(strain) if fields else none, np.array(stress) if fields else none,
     )  # fmt: skip
 

@@ -155,7 +155,7 @@ class Surrogate(eqx.Module):
         share = jnp.where(depth > 0, jnp.minimum(state.share, self.within(p)), 1.0)
         # Hertz: the slope of the force is 1.5 force / depth; friction needs no better
         stiffness = 1.5 * elastic[2] / jnp.clip(depth, 1e-9, self.depth)
-        extra, grip = drag.tick(self.rub, state.grip, p[:2], depth, force[2], stiffness, self.radius)
+        extra, grip = drag.tick(self.rub, state.grip, p[:2], depth, force[2], stiffness, self.radius, self.depth)
         grip = grip._replace(deepest=jnp.where(share > 0, grip.deepest, -1.0))
         return State(gone, now, grip, share), jnp.minimum(share, self.within(p)) * (force + extra)
 

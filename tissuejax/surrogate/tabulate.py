@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+import equinox as eqx
 import numpy as np
 from jaxtyping import Float
 
@@ -59,6 +60,8 @@ def surrogate(matter: Matter, box: Box, grid: Grid, ramps: list[Ramp], prony: tu
         settled, settled_shapes, where,
     )  # fmt: skip
     rub, rig, radius = contact_extras(matter, grid, (box.low + box.high) / 2)
+    fitted = slip_fitted(levels / box.depth, np.array([r.slip for r in ramps]))
+    rub = eqx.tree_at(lambda r: r.slip, rub, fitted)
     touch = first_contact(matter.lobe, box, radius)
     return Surrogate(
         box.low, box.high, np.asarray(box.depth), np.asarray(radius), touch, law, surface, memory, rub, rig,
@@ -87,11 +90,18 @@ def _moving_mesh(matter: Matter, box: Box, grid: Grid):
     )
 
 
+def slip_fitted(q: Float[np.ndarray, " k"], slips: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "3"]:
+    """c_1 to c_3 of `drag.slipping` by least squares over all sites; none where the vertical force is not positive."""
+    columns = np.tile(np.stack([q, q**2, q**3], 1), (len(slips), 1))
+    good = np.isfinite(slips.ravel()) & (slips.ravel() > 0)
+    return np.linalg.lstsq(columns[good], slips.ravel()[good] - 1, rcond=None)[0]
+
+
 def contact_extras(matter: Matter, grid: Grid, place: Float[np.ndarray, "2"]) -> tuple[drag.Rub, Rig, float]:
     """Friction, adhesion, the rig's part, and the ball's true radius, from the model's own scene."""
     probe = full_scene(matter, grid, place).probe
     number = lambda x: np.asarray(0.0 if x is None else float(x))  # noqa: E731
-    rub = drag.Rub(number(probe.friction), number(probe.give), number(probe.adhesion), number(probe.reach))
+    rub = drag.Rub(number(probe.friction), number(probe.give), number(probe.adhesion), number(probe.reach), np.zeros(3))
     offset = np.zeros(3) if probe.offset is None else np.asarray(probe.offset, float)
     rig = Rig(offset, np.asarray(float(probe.time[0])), number(probe.compliance))
     return rub, rig, float(probe.shape.radius)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.surrogate.cardinal import Table, four, four_slopes
-from tissuejax.surrogate.drag import BREAK, MINDLIN
+from tissuejax.surrogate.drag import BREAK, MINDLIN, slipping
 from tissuejax.surrogate.surrogate import FADE, Surrogate
 
 
@@ -68,7 +68,8 @@ class Asker:
         self.g, self.tau = (
             (np.zeros(0),) * 2 if s.memory is None else (np.asarray(s.memory.g), np.asarray(s.memory.tau))
         )
-        self.rub = type(s.rub)(*(float(v) for v in (s.rub.friction, s.rub.give, s.rub.strength, s.rub.reach)))
+        numbers = (float(v) for v in (s.rub.friction, s.rub.give, s.rub.strength, s.rub.reach))
+        self.rub = type(s.rub)(*numbers, np.asarray(s.rub.slip, float))
         self.rubs = float(self.rub.strength) > 0 or float(self.rub.friction) > 0
         self.rest()
 
@@ -154,7 +155,8 @@ class Asker:
             k = k / (1 + k * float(rub.give) / (np.pi * self.radius * max(depth, 1e-9)))
             keep = self.stiff / k if k > self.stiff else 1.0
             stretch = self.stretch * keep + at - last
-            length, limit = np.sqrt(stretch @ stretch + 1e-30), float(rub.friction) * max(normal, 0.0)
+            more = float(slipping(rub.slip, min(max(depth / self.most, 0.0), 1.0)))
+            length, limit = np.sqrt(stretch @ stretch + 1e-30), float(rub.friction) * max(normal, 0.0) * more
             self.stretch = min(1.0, limit / max(k * length, 1e-30)) * stretch if touching and k > 0 else np.zeros(2)
             self.stiff, force[:2] = k, -k * self.stretch
         self.at = np.array(at)

@@ -1,9 +1,9 @@
 """A surrogate's force as one flat little-endian file, for `tissuejax_force.h`: any language reads it in a few lines.
 
-Layout: "TJFORCE1"; int32 number of Prony terms, int32 zero; float64 low x, low y, high x, high y, depth, radius,
-factor, friction, give, strength, reach; float64 g[8], tau[8]; then the tables touch (over x, y), law, and with a
-memory stress and strain (over x, y, s): int32 counts of coefficients along x, y, s, int32 values M, float64 origin[3],
-1 / spacing[3], coefficients with M fastest.
+Layout: "TJFORCE2"; int32 number of Prony terms, int32 zero; float64 low x, low y, high x, high y, depth, radius,
+factor, friction, give, strength, reach, slip[3]; float64 g[8], tau[8]; then the tables touch (over x, y), law, and with
+a memory stress and strain (over x, y, s): int32 counts of coefficients along x, y, s, int32 values M, float64
+origin[3], 1 / spacing[3], coefficients with M fastest.
 """
 
 from pathlib import Path
@@ -15,7 +15,7 @@ from tissuejax.storage import write_bytes
 from tissuejax.surrogate.cardinal import Table
 from tissuejax.surrogate.surrogate import Surrogate
 
-MAGIC, TERMS, MODES = b"TJFORCE1", 8, 64
+MAGIC, TERMS, MODES = b"TJFORCE2", 8, 64
 
 
 def flat(surrogate: Surrogate) -> bytes:
@@ -31,7 +31,7 @@ def flat(surrogate: Surrogate) -> bytes:
         raise InputError(f"{len(g)} relaxation terms: a force file holds {TERMS}; precompute a model with fewer")
     numbers = [
         *np.asarray(s.low), *np.asarray(s.high), s.depth, s.radius, s.factor,
-        s.rub.friction, s.rub.give, s.rub.strength, max(float(s.rub.reach), 1e-9),
+        s.rub.friction, s.rub.give, s.rub.strength, max(float(s.rub.reach), 1e-9), *np.asarray(s.rub.slip),
     ]  # fmt: skip
     parts = [
         MAGIC,

@@ -66,7 +66,7 @@ TJ_API void tj_box(const tj_model *model, double box[7]);
 
 typedef struct { double origin[3], per[3]; int n[3], m; double *c; } tj__table;
 struct tj_model {
-    double low[2], high[2], depth, radius, factor, friction, give, strength, reach;
+    double low[2], high[2], depth, radius, factor, friction, give, strength, reach, slip[3];
     int terms;
     double g[TJ_TERMS], tau[TJ_TERMS];
     tj__table touch, law, stress, strain;
@@ -97,14 +97,14 @@ static int tj__table_in(FILE *f, tj__table *t, int axes) {
 TJ_API tj_model *tj_open(const char *path) {
     char magic[8];
     int32_t head[2];
-    double v[11];
+    double v[14];
     int fine = 0;
     FILE *f = fopen(path, "rb");
     tj_model *model = (tj_model *)calloc(1, sizeof *model);
     tj__said = "no such file";
     if (f && model) {
         tj__said = "not a tissuejax force file, or of another version";
-        if (tj__read(f, magic, 8) && !memcmp(magic, "TJFORCE1", 8) && tj__read(f, head, sizeof head) && head[0] >= 0
+        if (tj__read(f, magic, 8) && !memcmp(magic, "TJFORCE2", 8) && tj__read(f, head, sizeof head) && head[0] >= 0
             && head[0] <= TJ_TERMS) {
             tj__said = "cut off or damaged";
             model->terms = head[0];
@@ -119,6 +119,7 @@ TJ_API tj_model *tj_open(const char *path) {
     model->low[0] = v[0]; model->low[1] = v[1]; model->high[0] = v[2]; model->high[1] = v[3];
     model->depth = v[4]; model->radius = v[5]; model->factor = v[6];
     model->friction = v[7]; model->give = v[8]; model->strength = v[9]; model->reach = v[10];
+    model->slip[0] = v[11]; model->slip[1] = v[12]; model->slip[2] = v[13];
     tj__said = "";
     return model;
 }
@@ -223,13 +224,14 @@ static void tj__rub(const tj_model *m, tj_state *s, const double p[3], double de
         if (near > 5 * m->reach || s->share <= 0) s->deepest = -1;
     }
     if (m->friction > 0) {
-        double k = 2.0 / 3 * stiff, keep, x, y, length, slid;
+        double k = 2.0 / 3 * stiff, keep, x, y, length, slid, q = tj__clip(depth / m->depth, 0, 1);
+        double limit = m->friction * normal * (1 + q * (m->slip[0] + q * (m->slip[1] + q * m->slip[2])));
         k = k / (1 + k * m->give / (3.141592653589793 * m->radius * (depth > 1e-9 ? depth : 1e-9)));
         keep = k > s->stiffness ? s->stiffness / k : 1;
         x = s->stretch[0] * keep + p[0] - s->at[0];
         y = s->stretch[1] * keep + p[1] - s->at[1];
         length = k * sqrt(x * x + y * y + 1e-30);
-        slid = m->friction * normal / (length > 1e-30 ? length : 1e-30);
+        slid = limit / (length > 1e-30 ? length : 1e-30);
         if (slid > 1) slid = 1;
         if (!(depth > 0 && k > 0)) slid = 0;
         s->stretch[0] = slid * x; s->stretch[1] = slid * y; s->stiffness = k;
