@@ -7,6 +7,8 @@ from scipy.optimize import brentq, minimize_scalar
 from tests.specimens import SIZE, recording, stresses
 from tissuejax.effects.catalogue import effect
 from tissuejax.energies.catalogue import energy, volumetric
+from tissuejax.errors import InputError
+from tissuejax.experiments.homogeneous import axes
 from tissuejax.experiments.predictor import predictor
 from tissuejax.model import Model
 from tissuejax.recordings.recording import Sample
@@ -159,6 +161,26 @@ def test_directions_turn_with_the_specimen():
     np.testing.assert_allclose(y, predicted(model, along, "uniaxial", l1), rtol=1e-9, atol=1e-9)
     x = predicted(model, fibre, "uniaxial", l1, direction=[1.0, 0.0, 0.0])
     assert y[-1] > 1.5 * x[-1]
+
+
+def test_the_normal_of_sheared_planes_turns_what_fibres_feel():
+    """Fibres along the normal are tilted and stretched by shear, fibres across both are not touched: by hand,
+    F = 1 + g d n', so |F n|^2 = 1 + g^2 and |F (d x n)| = 1."""
+    model = Model(energy("reduced-polynomial-1")).with_effects(effect("anisotropy"))
+    fibre = {"energy.C10": 200.0, "effects.anisotropy.k1": 300.0, "effects.anisotropy.angle": np.pi / 2}  # along y
+    g = np.linspace(0.0, 0.5, 25)
+
+    def shear(direction, normal):
+        return predicted(model, fibre, "simple-shear", g, direction=direction, normal=normal)
+
+    plain = shear([1.0, 0.0, 0.0], [0.0, 0.0, 1.0])  # fibres across both
+    np.testing.assert_allclose(plain, 400.0 * g, rtol=1e-6, atol=1e-6)
+    stretched = shear([1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    assert stretched[-1] > 1.05 * plain[-1]
+    np.testing.assert_allclose(shear([0.0, 0.0, 1.0], [0.0, 1.0, 0.0]), stretched, rtol=1e-9, atol=1e-9)
+    for direction, normal in ((None, [0, 1, 0]), ([1, 0, 0], [1, 0.2, 0])):
+        with pytest.raises(InputError, match="normal"):
+            axes(direction, normal)
 
 
 def test_machine_compliance_against_a_root_find():

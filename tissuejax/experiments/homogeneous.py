@@ -76,7 +76,7 @@ class Homogeneous(Experiment):
             "height": known.get("height", np.nan),
             "diameter": known.get("diameter", 2 * np.sqrt(area / np.pi)),
         }
-        frame = axes(recording.attributes.get("direction"))
+        frame = axes(recording.attributes.get("direction"), recording.attributes.get("normal"))
         arrays = {name: np.asarray(value, float) for name, value in numbers.items()}
         return MaterialTest(time=time, drive=drive, frame=frame, mode=self.mode, **arrays)
 
@@ -92,15 +92,31 @@ class Homogeneous(Experiment):
         return reported(recording, _compiled(model.across(()), known, self.test(recording)))
 
 
-def axes(direction: object | None) -> np.ndarray:
+def axes(direction: object | None, normal: object | None = None) -> np.ndarray:
     """Rows: loaded, second and free axis of a test in the sample's frame.
 
-    The free axis is the one closest to the sample's z (to its y if loaded along z); without a direction the test's
-    axes are the sample's.
+    The second axis is the one given as `normal`: of the sheared planes, or of the second loaded direction. Without it
+    the free axis is the one closest to the sample's z (to its y if loaded along z); without a direction the test's axes
+    are the sample's.
+
+    Raises:
+        InputError: a normal without a direction, or not at right angles to it (to 5 degrees).
     """
     if direction is None:
+        if normal is not None:
+            raise InputError("normal is given without direction; give the direction of shear or of the first load too")
         return np.eye(3)
     first = np.asarray(direction, float) / np.linalg.norm(direction)
+    if normal is not None:
+        second = np.asarray(normal, float) / np.linalg.norm(normal)
+        if abs(float(second @ first)) > np.sin(np.radians(5)):
+            raise InputError(
+                f"normal {np.round(second, 3).tolist()} is not at right angles to direction "
+                f"{np.round(first, 3).tolist()}: shear runs along direction in planes across normal"
+            )
+        second -= (second @ first) * first
+        second /= np.linalg.norm(second)
+        return np.stack([first, second, np.cross(first, second)])
     near = np.array([0.0, 0.0, 1.0]) if abs(first[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
     third = near - (near @ first) * first
     third /= np.linalg.norm(third)

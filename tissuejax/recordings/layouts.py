@@ -59,6 +59,7 @@ def _homogeneous(kinematic: str, shape: tuple[str | int, ...], stretch: bool = T
         Item(kinematic, shape, "input", "1", noise="optional", stretch=stretch),
         Item("nominal_stress", shape, "channel", "Pa", "time", "nominal_stress", "required"),
         Item("direction", (3,), "attribute", "1", optional=True),
+        Item("normal", (3,), "attribute", "1", optional=True),
     )
 
 

@@ -45,7 +45,7 @@ SPECIMEN = {
 PART = (
     "file", "where", "sample", "recording", "experiment", "positive", "columns", "specimen", "noise",
     "attributes", "every", "missing", "settling", "relative_to_first", "lowpass", "separator",
-    "decimal", "comment", "skip", "header", "units_row", "format", "direction",
+    "decimal", "comment", "skip", "header", "units_row", "format", "direction", "normal",
     "cycles", "phase", "upto", "preload", "toe",
 )
 # fmt: on
@@ -96,6 +96,7 @@ class Part:
     relative_to_first: bool = False
     lowpass: float | None = None
     direction: tuple[float, float, float] | None = None
+    normal: tuple[float, float, float] | None = None
     selection: Selection = Selection()
     reading: Mapping[str, object] = field(default_factory=dict)
 
@@ -196,7 +197,8 @@ def _part(table: Mapping[str, object]) -> Part:
         settling=get("settling", bool, False),
         relative_to_first=get("relative_to_first", bool, False),
         lowpass=None if lowpass is None else quantity(lowpass, "Hz", "lowpass"),
-        direction=_direction(table.get("direction")),
+        direction=_direction("direction", table.get("direction")),
+        normal=_direction("normal", table.get("normal")),
         selection=selection_from(table),
         reading={k: table[k] for k in READING if k in table},
     )
@@ -238,7 +240,7 @@ def _in_our_words(
     return found
 
 
-def _direction(value: object) -> tuple[float, float, float] | None:
+def _direction(name: str, value: object) -> tuple[float, float, float] | None:
     """A direction in the sample's own frame, of length one."""
     if value is None:
         return None
@@ -246,7 +248,7 @@ def _direction(value: object) -> tuple[float, float, float] | None:
     length = sum(v * v for v in value) ** 0.5 if numbers else 0.0
     if not numbers or len(value) != 3 or not 0 < length < float("inf"):
         raise InputError(
-            f"direction: found {value!r}, expected three numbers, such as [1, 0, 0]: where the load points"
+            f"{name}: found {value!r}, expected three numbers, such as [1, 0, 0], in the tissue's own frame"
         )
     return tuple(v / length for v in value)
 

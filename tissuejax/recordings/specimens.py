@@ -65,6 +65,8 @@ def recording_from(
     attributes = dict(part.attributes) | given
     if part.direction is not None:
         attributes["direction"] = np.array(part.direction)
+    if part.normal is not None:
+        attributes["normal"] = np.array(part.normal)
     if part.experiment in ("probing", "cutting"):
         return _probing(part, time, values, kinematic, load, sizes, name, place, attributes), notes
     motion = _motion(part, values[kinematic], kinematic, sizes, place)
