@@ -8,6 +8,7 @@ with progress.stage("fitting specimens", total=190) as stage:
 
 import abc
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -86,6 +87,43 @@ class Bar(Progress):
                 self._bars.stop()
 
 
+class _LineStage(Stage):
+    def __init__(self, lines, description: str, total: int | None):
+        self._lines, self._description, self._total, self._done, self._note = lines, description, total, 0, ""
+
+    def advance(self, steps: int = 1, note: str = "") -> None:
+        self._done, self._note = self._done + steps, note or self._note
+        self._lines.told(self)
+
+    def __str__(self) -> str:
+        of = f" {self._done} of {self._total}" if self._total else ""
+        return f"{self._description}{of}: {self._note}" if self._note else f"{self._description}{of}"
+
+
+class Lines(Progress):
+    """A line now and then on standard error, for logs: nothing at all of what is done within seconds.
+
+    Args:
+        every: s between two lines at least, and before the first.
+    """
+
+    def __init__(self, every: float = 10.0, file=None):
+        self._every, self._file = every, file
+        self._begun = self._last = time.monotonic()
+
+    @contextmanager
+    def stage(self, description: str, total: int | None = None) -> Iterator[Stage]:
+        """A stage that says where it is when it advances and the last line is old enough."""
+        yield _LineStage(self, description, total)
+
+    def told(self, stage: Stage) -> None:
+        """Write the line of a stage if it is time for one."""
+        now = time.monotonic()
+        if now - self._last >= self._every:
+            self._last = now
+            print(f"[{now - self._begun:6.0f} s] {stage}", file=self._file or sys.stderr, flush=True)
+
+
 def for_terminal() -> Progress:
-    """A bar where standard error is a terminal, silence where it is a file or a pipe."""
-    return Bar() if sys.stderr.isatty() else Silent()
+    """A bar where standard error is a terminal, a line now and then where it is a file or a pipe."""
+    return Bar() if sys.stderr.isatty() else Lines()

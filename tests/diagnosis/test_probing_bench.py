@@ -10,8 +10,8 @@ from tissuejax.cache import source
 from tissuejax.diagnosis import probing_free
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.probing import ProbingBench
-from tissuejax.diagnosis.probing_runs import COARSE, FINE
-from tissuejax.diagnosis.probing_view import REMAINS, ProbingView
+from tissuejax.diagnosis.probing_runs import COARSE, FINE, RETIMED
+from tissuejax.diagnosis.probing_view import LEFT, REMAINS, ProbingView
 from tissuejax.diagnosis.refit import refit
 from tissuejax.energies.catalogue import energy
 from tissuejax.recordings.recording import Sample
@@ -119,29 +119,68 @@ def test_a_probe_that_is_too_low_is_found_again(bench):
     assert found.chi2 < 1.1 * found.n
 
 
-def test_a_view_is_exact_where_it_is_anchored_and_weighs_every_channel_alike(bench):
+def test_a_view_is_the_fine_simulation_at_its_anchor_and_weighs_every_channel_alike(bench):
     view = ProbingView.of(bench)
     near = view.anchored(VALUES)
+    fine, slow, coarse = (bench.runs.many([(bench.at(VALUES), bench.fitted, k)])[0] for k in (FINE, RETIMED, COARSE))
+    late = view._held_back(slow, coarse)
     exact = near.natural(near.predict(VALUES))
-    np.testing.assert_allclose(exact, bench.predict(VALUES), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(exact, fine + LEFT * late, rtol=1e-9, atol=1e-12)
     # beside the anchor it changes as the coarse simulation does
     other = VALUES | {"energy.C10": 1.1 * VALUES["energy.C10"]}
-    coarse = [bench.runs.many([(bench.at(v), bench.fitted, COARSE)])[0] for v in (VALUES, other)]
+    twice = [bench.runs.many([(bench.at(v), bench.fitted, COARSE)])[0] for v in (VALUES, other)]
     change = near.natural(near.predict(other)) - exact
-    np.testing.assert_allclose(change, coarse[1] - coarse[0], rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(change, twice[1] - twice[0], rtol=1e-6, atol=1e-9)
     for channel in ("force", "markers"):
         rows = np.concatenate([view.y[s.rows] for s in view.segments if s.channel == channel])
         assert 0.9 < np.abs(rows).max() < 2.0
 
 
+def test_what_comes_late_is_told_from_what_rings(bench):
+    """Of a prediction that comes 10 ms late and rings, the delay is taken and the ringing left."""
+    view, slow = ProbingView.of(bench), bench.runs.many([(bench.at(VALUES), bench.fitted, RETIMED)])[0]
+    moved = np.zeros(len(slow))
+    for s in view.segments:
+        moved[s.rows] = np.interp(s.time - 0.01, s.time, slow[s.rows]) - slow[s.rows]
+    ringing = 0.2 * np.std(moved) * np.sin(3.0 * np.arange(len(slow)))
+    found = view._held_back(slow, slow - moved - ringing)
+    force = np.concatenate([np.r_[s.rows] for s in view.segments if s.label == "force z"])
+    assert np.linalg.norm((found - moved)[force]) < 0.35 * np.linalg.norm(moved[force])
+    slope = float(found[force] @ moved[force]) / float(moved[force] @ moved[force])
+    assert 0.85 < slope < 1.15
+
+
 def test_what_is_open_is_a_column_for_every_channel_of_every_recording(bench):
     near = ProbingView.of(bench).anchored(VALUES)
-    columns = near.numerical
     pairs = {(s.recording, s.channel) for s in bench.segments}
-    assert columns.shape == (len(bench.y), len(pairs))
-    assert (np.count_nonzero(columns, axis=1) <= 1).all()
-    fine, coarse = (bench.runs.many([(bench.at(VALUES), bench.fitted, k)])[0] for k in (FINE, COARSE))
-    np.testing.assert_allclose(columns.sum(axis=1) * near.unit, REMAINS * (fine - coarse), rtol=1e-6, atol=1e-12)
+    fine, slow = (bench.runs.many([(bench.at(VALUES), bench.fitted, k)])[0] for k in (FINE, RETIMED))
+    assert set(near.numerical) == {"mesh", "speed"}
+    for columns in near.numerical.values():
+        assert columns.shape == (len(bench.y), len(pairs))
+        assert (np.count_nonzero(columns, axis=1) <= 1).all()
+    mesh = near.numerical["mesh"].sum(axis=1) * near.unit
+    np.testing.assert_allclose(mesh, REMAINS * (fine - slow), rtol=1e-6, atol=1e-12)
+
+
+def test_a_derivative_is_taken_from_nearby_and_anew_farther_off(bench):
+    view = ProbingView.of(bench).anchored(VALUES)
+    first = view.jacobian(VALUES, ("energy.C10",))
+    count, near = bench.runs.count, VALUES | {"energy.C10": 1.01 * VALUES["energy.C10"]}
+    again = view.jacobian(near, ("energy.C10",))
+    assert bench.runs.count <= count + 2  # what is predicted there, and no displaced simulation
+    np.testing.assert_allclose(1.01 * again, first, rtol=1e-9)
+    count = bench.runs.count
+    view.jacobian(VALUES | {"energy.C10": 1.3 * VALUES["energy.C10"]}, ("energy.C10",))
+    assert bench.runs.count == count + 4
+
+
+def test_where_a_marker_rests_is_known_to_its_noise_over_the_frames_it_was_seen_at_rest(bench):
+    view = ProbingView.of(bench)
+    for s, shared in zip(view.segments, view.shared, strict=True):
+        if s.channel == "force":
+            assert shared == 0.0
+        else:
+            assert 0.1 * view.sigma[s.rows][0] < shared < 0.6 * view.sigma[s.rows][0]
 
 
 def test_a_stopped_diagnosis_finds_its_runs_again(pressed_too_deep, tmp_path, monkeypatch):

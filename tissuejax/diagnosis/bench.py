@@ -8,6 +8,7 @@ parameter paths that are neutral until freed. Material tests and probings are tw
 import abc
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -156,13 +157,29 @@ class Bench(abc.ABC):
         """Shapes at which to score a candidate; a bench may read some from the residual (a period, a place)."""
         return candidate.grid
 
+    costly: ClassVar[bool] = False  # whether a prediction costs so much that one is saved where nothing hangs on it
+
     def anchored(self, values: Mapping[str, float]) -> "Bench":
         """The bench with predictions exact at `values`: itself, unless it corrects a cheaper simulation there."""
         return self
 
+    def rooted(self, values: Mapping[str, float]) -> "Bench":
+        """The bench about the base's fit: where predictions are costly, scores take their columns there."""
+        return self
+
+    def sharpened(self) -> "Bench":
+        """The bench with derivatives of the very place they are asked for; itself, unless it takes them nearby."""
+        return self
+
     @property
-    def numerical(self) -> Float[np.ndarray, "N q"] | None:
-        """What mesh and step of a simulation leave open, a column for each independent part; None in closed form."""
+    def shared(self) -> Float[np.ndarray, " S"] | None:
+        """By segment, standard deviation of an error that all its samples share and that is noise; None for none."""
+        return None
+
+    @property
+    def numerical(self) -> Mapping[str, Float[np.ndarray, "N q"]] | None:
+        """What mesh and speed of a simulation leave open, by cause, a column for each independent part; None in closed
+        form."""
         return None
 
     @property

@@ -49,9 +49,11 @@ PROBING = Effort(
     parents=(2, 0),
     reshaped=(2, 1),
     starts=1,
-    spend=900.0,
+    spend=600.0,
     rounds=2,
-    iterations=6,
+    iterations=4,
+    least=-1.0,
+    given_up=6.0,
     stepwise=True,
 )
 
@@ -141,11 +143,17 @@ def diagnose(
         )
     # matrices are thin here: threads of the linear algebra would wait for each other and keep a core from the rest
     with (progress or Silent()).stage(f"diagnosing {sample.name}") as stage, threadpool_limits(1, "blas"):
+        said = ["reading"]
 
         def noted(note: str) -> None:
+            said[0] = note
             stage.advance(note=note)
 
+        def ran(count: int) -> None:
+            stage.advance(0, f"{said[0]}; {count} simulations")
+
         if kind == "probing":
+            own.runs.report = ran
             cut = probing_blocks(whole)
             of = probing_discrepancy(whole, cut)
         else:

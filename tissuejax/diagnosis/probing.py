@@ -24,8 +24,9 @@ from tissuejax.diagnosis.bench import Bench, Candidate, Free
 from tissuejax.diagnosis.catalogue import Entry
 from tissuejax.diagnosis.periodogram import lines
 from tissuejax.diagnosis.probing_catalogue import places, probing_entries
-from tissuejax.diagnosis.probing_runs import COARSE, FINE, ROUGH, Runs
+from tissuejax.diagnosis.probing_runs import COARSE, FINE, RETIMED, ROUGH, Runs
 from tissuejax.diagnosis.probing_series import kept_samples, series
+from tissuejax.diagnosis.probing_slopes import Slopes
 from tissuejax.effects.catalogue import effects
 from tissuejax.energies.catalogue import volumetric
 from tissuejax.energies.energy import Energy
@@ -77,8 +78,10 @@ class ProbingBench(Bench):
         )
         bench.ready, bench.model = ready, model
         bench.finite = kept_samples(sample, segments)
-        bench.runs = Runs({FINE: ready, COARSE: ready.with_settings(rough)}, {}, segments, y, bench.finite, keep)
-        bench.slopes = COARSE
+        coarse = ready.with_settings(rough)
+        slow = coarse.with_settings(rough.changed(compression=ready.settings.compression))
+        bench.runs = Runs({FINE: ready, RETIMED: slow, COARSE: coarse}, {}, segments, y, bench.finite, keep)
+        bench.slopes, bench.slopes_taken = COARSE, Slopes()
         bench._declare(names)
         return bench
 

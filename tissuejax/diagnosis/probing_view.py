@@ -1,14 +1,22 @@
 """Probings as they are weighed: all channels in units of their size, predicted cheaply and corrected where it counts.
 
-Most predictions come from the coarse simulation, to which is added what the fine one differed from it at one set of
-values, the anchor:
+Most predictions come from the coarse simulation: a coarse mesh, run twice as fast as the fine one. At one set of
+values, the anchor, the coarse mesh is also run at the speed of the fine one (slow), and added is what that tells:
 
-    y(theta) = coarse(theta) + [fine(anchor) - coarse(anchor)].
+    y(theta) = coarse(theta) + [fine - coarse] - late [d slow / dt]    (brackets at the anchor).
 
-A fit is anchored anew where it came to rest, so its residual is that of the fine simulation, and where both agree on
-the slopes it is the fine simulation's fit. The same difference tells what mesh and step leave open at the fine one:
-for a mesh of order two and a step whose drag and lag are in proportion to it, `REMAINS` of the change between the two.
-That is the known part of the discrepancy.
+The first bracket makes it the fine simulation there; the second takes out what that one still errs by its speed. Tissue
+that is moved faster than life is held back by damping and inertia: loading is too stiff and unloading too soft, as if
+the measurement came late, and a late clock or a tissue that remembers would be named for it. By how much, of each
+channel of each recording, is read from slow - coarse by least squares; what else the two differ in is ringing, another
+one at each speed. An error of first order in the speed (damping) is as large again as that difference, one of second
+order (inertia) a third of it: `LEFT` takes the middle, `EITHER` the half way to both.
+
+A fit is anchored anew where it came to rest. What is left open is the known part of the discrepancy: of the mesh, of
+order two, `REMAINS` of the change from coarse to fine; of the speed `EITHER` of slow - coarse.
+
+A column of the Jacobian is a simulation of every recording too: those of the base's fit nominate effects, and a descent
+takes those it finds nearby (`probing_slopes`).
 
 Source: additive correction of a cheap model, Alexandrov and Lewis 2001, Optimization and Engineering 2; extrapolation,
 Richardson 1911, Phil. Trans. R. Soc. A 210.
@@ -17,18 +25,29 @@ Richardson 1911, Phil. Trans. R. Soc. A 210.
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float
+from scipy.ndimage import gaussian_filter1d
 
 from tissuejax.diagnosis.bench import Bench, Candidate
 from tissuejax.diagnosis.judgement.blocks import Blocks, blocks
 from tissuejax.diagnosis.probing import ProbingBench
-from tissuejax.diagnosis.probing_runs import COARSE, FINE
+from tissuejax.diagnosis.probing_runs import COARSE, FINE, RETIMED
+from tissuejax.diagnosis.probing_slopes import Slope
 from tissuejax.estimation.discrepancy import ALIKE, LAW, SLOW, STATES, Part, loading_states, smooth_factor
+from tissuejax.experiments.probing_sensors import FEWEST
 
 BLOCKS = {"force": 80, "markers": 16}  # block means of a series: markers are many and calm
-REMAINS = 1.2  # mesh 12 to 16 elements: 1 / (16^2 / 12^2 - 1) = 1.29; step halved: 1
+REACH, SHARP = 0.03, 0.01  # relative change of the prediction up to which a derivative is taken from nearby
+# the same for the correction: while the base is fitted; and about it, where one correction for all sets leaves its own
+# errors (meshes ring, a few nats' worth) out of their comparison
+STAYS, COMMON = 0.03, 0.15
+REMAINS = 1.29  # mesh of 12 to 16 elements: 1 / (16^2 / 12^2 - 1)
+TOUCHING = 0.05  # of the depth: where a shift of the surface is no small part of it
+CALMED = 3.0  # samples over which a rate is smoothed, so that it doesn't ring
+LEFT, EITHER = 2 / 3, 1 / 3  # of the change from twice the speed: 1 / (2^p - 1) for order p = 1 and 2
 
 
 class ProbingView(Bench):
@@ -37,8 +56,12 @@ class ProbingView(Bench):
     Attributes beyond those of `Bench`:
         source: the probings in SI units.
         origin, unit: of each row: a marker's place at rest, and the largest force or displacement.
-        shift: correction of the coarse simulation, SI.
+        shift: correction of the coarse simulation, SI; `place`: what that simulation predicts where it was taken.
+        root: the base's fit, where columns of scores are taken; None until it is known.
+        reach: change of the prediction up to which a derivative is taken from nearby.
     """
+
+    costly: ClassVar[bool] = True
 
     @classmethod
     def of(cls, source: ProbingBench) -> "ProbingView":
@@ -66,7 +89,8 @@ class ProbingView(Bench):
             source.warnings,
         )
         made.source, made.origin, made.unit = source, origin, unit
-        made.shift, made._open = np.zeros(len(source.y)), None
+        made.shift, made._open, made.place = np.zeros(len(source.y)), None, None
+        made.root, made.reach, made.stays = None, REACH, STAYS
         return made
 
     @property
@@ -88,17 +112,40 @@ class ProbingView(Bench):
         return prediction * self.unit + self.origin
 
     def anchored(self, values: Mapping[str, float]) -> "ProbingView":
-        """See `Bench.anchored`; two runs of every recording, one of them on the fine mesh."""
+        """See `Bench.anchored`; three runs of every recording, one of them on the fine mesh.
+
+        Where the prediction has hardly changed since the last anchor that one stays: the correction changes in
+        proportion to what it corrects.
+        """
         names = (*self.fitted, *self.held_out)
         at = self.source.at({p: v for p, v in values.items() if p in self.free})
-        fine, coarse = self.source.runs.many([(at, names, FINE), (at, names, COARSE)])
+        if self.place is not None:
+            told = self.source.runs.many([(at, names, COARSE)])[0]
+            if self._change(told, self.place, names) < self.stays:
+                return self
+        fine, slow, coarse = self.source.runs.many([(at, names, k) for k in (FINE, RETIMED, COARSE)])
         made = copy.copy(self)
-        made.shift = fine - coarse
-        made._open = self._errors(REMAINS * made.shift / self.unit)
+        late = self._held_back(slow, coarse)
+        made.shift, made.place = fine - coarse + LEFT * late, coarse
+        made._open = {
+            "mesh": self._errors(REMAINS * (fine - slow) / self.unit),
+            "speed": self._errors(EITHER * late / self.unit),
+        }
         return made
 
+    def _held_back(self, slow: Float[np.ndarray, " N"], coarse: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+        """The part of slow - coarse that is as if each channel of a recording came late."""
+        rate, out = np.zeros(len(slow)), np.zeros(len(slow))
+        for s in self.segments:
+            rate[s.rows] = gaussian_filter1d(np.gradient(slow[s.rows], s.time), CALMED)
+        for pair in dict.fromkeys((s.recording, s.channel) for s in self.segments):
+            rows = np.concatenate([np.r_[s.rows] for s in self.segments if (s.recording, s.channel) == pair])
+            r, size = rate[rows], float(rate[rows] @ rate[rows])
+            out[rows] = r * float(r @ (slow - coarse)[rows]) / size if size > 0 else 0.0
+        return out
+
     @property
-    def numerical(self) -> Float[np.ndarray, "N q"] | None:
+    def numerical(self) -> Mapping[str, Float[np.ndarray, "N q"]] | None:
         """See `Bench.numerical`."""
         return self._open
 
@@ -116,17 +163,94 @@ class ProbingView(Bench):
         told = self.source.runs.many([(self.source.at(values), wanted, COARSE)])[0]
         return (told + self.shift - self.origin) / self.unit
 
+    def rooted(self, values: Mapping[str, float]) -> "ProbingView":
+        """See `Bench.rooted`."""
+        made = copy.copy(self)
+        made.root, made.stays = self.source.at({p: v for p, v in values.items() if p in self.free}), COMMON
+        return made
+
+    def sharpened(self) -> "ProbingView":
+        """See `Bench.sharpened`."""
+        made = copy.copy(self)
+        made.reach = SHARP
+        return made
+
     def jacobian(
         self, values: Mapping[str, float], paths: Sequence[str], recordings: Sequence[str] | None = None
     ) -> Float[np.ndarray, "N k"]:
-        """See `Bench.jacobian`."""
-        return self.source.jacobian(values, paths, recordings) / self.unit[:, None]
+        """See `Bench.jacobian`; columns taken nearby are taken again."""
+        wanted = tuple(recordings or (*self.fitted, *self.held_out))
+        at = {**{p: self.source.start[p] for p in paths}, **self.source.at(values)}
+        columns = {p: self._nearby(p, at, wanted, self.reach) for p in paths}
+        missing = [p for p, c in columns.items() if c is None]
+        if missing:
+            made = self.source.jacobian(values, missing, wanted)
+            for p, column in zip(missing, made.T, strict=True):
+                columns[p] = self._kept(p, at, wanted, column)
+        return np.stack([columns[p] for p in paths], axis=1) / self.unit[:, None]
 
     def columns(
         self, values: Mapping[str, float], settings: Sequence[tuple[Mapping[str, float], str]]
     ) -> Float[np.ndarray, "N k"]:
-        """See `Bench.columns`."""
-        return self.source.columns(values, settings) / self.unit[:, None]
+        """See `Bench.columns`; about the base's fit once that is known: a score only has to nominate."""
+        base = self.source.at(values) if self.root is None else self.root
+        asked = [({**base, p: self.source.start[p], **s}, p) for s, p in settings]
+        asked = [({**at, p: base.get(p, self.source.start[p])}, p) for at, p in asked]
+        columns = [self._nearby(p, at, self.fitted, self.reach) for at, p in asked]
+        missing = [i for i, c in enumerate(columns) if c is None]
+        if missing:
+            made = self.source.columns(base, [settings[i] for i in missing])
+            for i, column in zip(missing, made.T, strict=True):
+                columns[i] = self._kept(asked[i][1], asked[i][0], self.fitted, column)
+        return np.stack(columns, axis=1) / self.unit[:, None]
+
+    def _nearby(self, path, at, wanted, reach) -> Float[np.ndarray, " N"] | None:
+        if path not in self.source.slopes_taken.taken:
+            return None
+        told = self.source.runs.many([(at, wanted, COARSE)])[0]
+
+        def change(other: Float[np.ndarray, " N"]) -> float:
+            return self._change(told, other, wanted)
+
+        return self.source.slopes_taken.find(path, at, self.free, wanted, change, reach)
+
+    def _kept(self, path, at, wanted, column) -> Float[np.ndarray, " N"]:
+        told = self.source.runs.many([(at, wanted, COARSE)])[0]
+        self.source.slopes_taken.keep(path, Slope(dict(at), told, frozenset(wanted), column))
+        return column
+
+    def _change(self, one, other, recordings) -> float:
+        """Relative difference of two predictions, of the channel where it is largest: markers feel no stiffness."""
+        out = 0.0
+        for channel in dict.fromkeys(s.channel for s in self.segments):
+            own = [np.r_[s.rows] for s in self.segments if s.channel == channel and s.recording in recordings]
+            rows = np.concatenate(own) if own else np.zeros(0, int)
+            size = float(np.linalg.norm((one - self.origin)[rows] / self.unit[rows]))
+            moved = float(np.linalg.norm(((other - one) / self.unit)[rows]))
+            out = max(out, moved / max(size, 1e-300))
+        return out
+
+    @property
+    def shared(self) -> Float[np.ndarray, " S"]:
+        """See `Bench.shared`: where a marker rests is measured too, as the mean of the frames out of contact.
+
+        A prediction starts from that mean, so its error stays in the whole series.
+        """
+        frames = {}
+        for s in self.segments:
+            if s.channel == "markers":
+                touch = float(self.source.ready.setups[s.recording].test.first_touch)
+                calm = int(np.sum((s.drive <= 0) & (s.time < touch)))
+                frames[s.recording, s.component] = calm if calm >= FEWEST else int(np.sum(s.drive <= 0))
+        rests = [np.asarray(self.source.ready.setups[n].test.rest, float) for n, _ in frames]
+        pooled = bool(rests) and all(r.shape == rests[0].shape and np.allclose(r, rests[0]) for r in rests)
+        out = np.zeros(len(self.segments))
+        for i, s in enumerate(self.segments):
+            if s.channel == "markers":
+                own = frames[s.recording, s.component]
+                several = sum(n for (_, c), n in frames.items() if c == s.component) if pooled else own
+                out[i] = float(np.median(self.sigma[s.rows])) / np.sqrt(max(several, 1))
+        return out
 
     def settings(self, candidate: Candidate, prediction: Float[np.ndarray, " N"]) -> Sequence[Mapping[str, float]]:
         """See `Bench.settings`."""
@@ -145,22 +269,34 @@ class ProbingDiscrepancy:
     Attributes:
         shaped: name, family and factors about a prediction of one, of the parts that scale with what is predicted.
         fixed: the parts that don't.
+        crossed: blocks of a lateral force, and of the vertical one of the same recording, both with their times.
     """
 
     shaped: tuple[tuple[str, str, Float[np.ndarray, "M r"]], ...]
     fixed: tuple[Part, ...]
+    crossed: tuple[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray], ...] = ()
 
     def about(self, prediction: Float[np.ndarray, " M"]) -> tuple[Part, ...]:
         """The parts beside this prediction; always in the same order."""
-        return (*(Part(name, family, prediction[:, None] * f) for name, family, f in self.shaped), *self.fixed)
+        shaped = [Part(name, family, prediction[:, None] * f) for name, family, f in self.shaped]
+        if self.crossed:
+            factor = np.zeros((len(prediction), len(self.crossed)))
+            for column, (rows, time, vertical, clock) in zip(factor.T, self.crossed, strict=True):
+                column[rows] = np.interp(time, clock, prediction[vertical])
+            shaped.append(Part("crosstalk", "gain", factor))
+        return (*shaped, *self.fixed)
 
 
 def probing_discrepancy(view: ProbingView, cut: Blocks) -> ProbingDiscrepancy:
     """The discrepancy of probings, in the families of material tests and one of each marker's own.
 
-    Law: smooth in depth times the prediction, common to all recordings. Gain, own law: of each recording's own.
+    Law: smooth in depth times the prediction, common to all recordings. Gain, own law: of each recording's own. Onset:
+    of each recording's own too, a surface that is met too early or late, by a share of the depth (facets, softness of
+    contact, how well the body is placed): of a force like depth^n, n times that over the depth.
     Hysteresis (of the force) and slow wander: in units of the channel's largest value. Marker: smooth in depth times
-    what the marker moved, of each component's own, since a marker is not quite where it was registered.
+    what the marker moved, of each component's own, since a marker is not quite where it was registered. Crosstalk: a
+    share of the vertical force in a lateral one, as load cells of several axes have it, and meshes that are not
+    symmetric.
     """
     segments = view.segments
     rows = [np.flatnonzero(cut.owner == k) for k in range(len(segments))]
@@ -188,6 +324,8 @@ def probing_discrepancy(view: ProbingView, cut: Blocks) -> ProbingDiscrepancy:
         shaped.append((f"gain{of}", "gain", np.concatenate(each, axis=1).astype(float)))
         shaped.append((f"own law{of}", "gain", np.concatenate([wide * e for e in each], axis=1)))
         if c == "force":
+            onset = 1.5 * span / (np.maximum(depth, 0.0) + TOUCHING * span)  # of a ball on an elastic body, n = 3/2
+            shaped.append(("onset", "onset", np.concatenate([onset[:, None] * e for e in each], axis=1)))
             shaped.append(("fine law", "law", fine * inside))
             for i, shape in enumerate(STATES):
                 fixed.append(Part(f"hysteresis, {shape}", "hysteresis", alike * inside * states[:, i, None]))
@@ -206,7 +344,13 @@ def probing_discrepancy(view: ProbingView, cut: Blocks) -> ProbingDiscrepancy:
             return near * np.outer(moved[o], moved[o])
 
         fixed.append(Part("marker", "marker", within=_within(rows, (channel == "markers")[:, None], marker)))
-    return ProbingDiscrepancy(tuple(shaped), tuple(fixed))
+    upright = {s.recording: k for k, s in enumerate(segments) if (s.channel, s.component) == ("force", "z")}
+    crossed = []
+    for k, s in enumerate(segments):
+        if s.channel == "force" and s.component != "z" and s.recording in upright:
+            z = rows[upright[s.recording]]
+            crossed.append((rows[k], time[rows[k]], z, time[z]))
+    return ProbingDiscrepancy(tuple(shaped), tuple(fixed), tuple(crossed))
 
 
 def _within(rows, inside, block) -> tuple[Float[np.ndarray, "n n"], ...]:

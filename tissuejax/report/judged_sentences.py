@@ -19,6 +19,10 @@ PARTS = {
     "white": "scatter from sample to sample beyond the stated noise",
     "marker": "each marker's own, smooth in depth",
     "numerical": "what mesh and step of the simulation leave open",
+    "mesh": "what the mesh of the simulation leaves open",
+    "speed": "what the speed of the simulation leaves open",
+    "crosstalk": "vertical force in the lateral ones",
+    "onset": "where the surface is met",
 }
 
 
@@ -115,7 +119,7 @@ def sure(d: Diagnosis) -> list[str]:
         out.append(
             f"Of what has a name, beyond its parameters (typical amplitudes, shares of the stress): {'; '.join(own)}."
         )
-    large = [f"{_part(k)} {100 * v:.2g} %" for k, v in rest["parts"].items() if v > 1e-3 and k != "numerical"]
+    large = [f"{_part(k)} {100 * v:.2g} %" for k, v in rest["parts"].items() if v > 1e-3 and k not in ("mesh", "speed")]
     if large:
         out.append(f"What is left, by kind, as shares of the stress (typical amplitudes): {'; '.join(large)}.")
     if j.chosen.numerical:

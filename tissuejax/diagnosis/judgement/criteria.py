@@ -17,8 +17,9 @@ class Criteria:
             catalogue doesn't have, beside whatever else acts. Ground: as likely as two effects at once.
         shares: standard deviation of the half-normal prior of a discrepancy's amplitude, a share of the stress, by
             family. Ground: what the best published laws leave of careful recordings, 1 to 4 % of the peak in all; of a
-            marker, of what it moved (it is not quite where it was registered); of the numerical error, in units of
-            what mesh and step leave open by Richardson's extrapolation.
+            surface that is met early or late, of the depth of a press; of a marker, of what it moved (it is not quite
+            where it was registered); of the numerical error, in units of what mesh and speed leave open by Richardson's
+            extrapolation.
         strange: by which factor such a part is wider. Ground: 10 makes of 1 to 2 % the 10 to
             20 % by which effects of the catalogue change a recording.
         change: standard deviation of the half-normal (two-sided: normal) prior of an effect's amplitude: the change of
@@ -30,6 +31,8 @@ class Criteria:
             the values scanned. Ground: a factor of 5 either way.
         negligible: root mean square of the rest, as a share of the peak, up to which nothing of note is left.
             Ground: load cells are verified to 1 % (class 1 of ISO 7500-1); half of that.
+        unseen: share of a sensor's noise, of single samples, up to which a rest of a simulation is negligible too.
+            Ground: markers are seen to a tenth of what most of them move; half of that shows in no picture.
         named: probability from which a name is given. Ground: likelier present than not (the median probability model
             of Barbieri and Berger 2004).
         covered: share of the probability of named sets that the alternatives offered add up to.
@@ -40,7 +43,7 @@ class Criteria:
     shares: Mapping[str, float] = field(
         default_factory=lambda: (
             {"law": 0.015, "gain": 0.015, "hysteresis": 0.01, "slow": 0.01, "white": 0.005}
-            | {"marker": 0.02, "numerical": 1.0}
+            | {"marker": 0.02, "onset": 0.01, "numerical": 1.0}
         )
     )
     strange: float = 10.0
@@ -48,6 +51,7 @@ class Criteria:
     rig: float = 0.1
     shape: float = float(np.log(5.0))
     negligible: float = 0.005
+    unseen: float = 0.5
     named: float = 0.5
     covered: float = 0.9
 

@@ -44,6 +44,8 @@ class Effort:
         spend: cost of all predictions (of the plain base model each) after which nothing new is begun.
         nested: searches and memories nested in a prediction at most.
         rounds, iterations: of fit and amplitudes in turn, and of a fit.
+        least: nats that the linear step of a single effect has to promise.
+        given_up: nats below the best set at which a set is not followed to the end of its fit.
         stepwise: a second effect is sought only where a first one has come in.
     """
 
@@ -58,6 +60,8 @@ class Effort:
     nested: int = 2
     rounds: int = ROUNDS
     iterations: int = 12
+    least: float = LITTLE
+    given_up: float = GIVEN_UP
     stepwise: bool = False
 
 
@@ -138,19 +142,20 @@ class Exploration:
     def weigh(self, order: Sequence[str], starts: Sequence[Mapping[str, float]], **options) -> Weighed | None:
         """Weigh a set from the best of several starts; remembered. None if there is nothing left to spend."""
         key = frozenset(order)
-        if key in self.weighed and not options:
+        if key in self.weighed and not set(options) - {"bench"}:
             return self.weighed[key]
         if order and self.bench.spent > self.effort.spend:
             self.exhausted = True
             return None
-        self.report(" + ".join(order) or "base model")
+        self._tell("weighing", order)
         if len(starts) > 1:
             tried = [weigh(self.scales, order, s, self.criteria, rounds=1, iterations=5, **options) for s in starts]
             first = max(tried, key=lambda w: w.evidence.log_evidence)
             starts = [first.refit.values or starts[0]]
             options = {"v": first.v, **options} if first.refit.values else options
-        floor = self.weighed[self.best].evidence.log_evidence - GIVEN_UP
+        floor = self.weighed[self.best].evidence.log_evidence - self.effort.given_up
         options = {"rounds": self.effort.rounds, "iterations": self.effort.iterations, **options}
+        options = {"anchor": not self.bench.costly, **options}
         found = weigh(self.scales, order, starts[0], self.criteria, floor=floor, **options)
         old = self.weighed.get(key)
         if old is None or found.evidence.log_evidence > old.evidence.log_evidence:
@@ -161,6 +166,7 @@ class Exploration:
         """Every candidate that may join the set, by the log evidence that its linear step gains, best first."""
         if key in self.scored:
             return self.scored[key]
+        self._tell("trying every effect beside", sorted(self.names(key)))
         at, names = self.weighed[key], self.names(key)
         left = [
             c
@@ -229,7 +235,7 @@ class Exploration:
             free = [c for c in self.bench.candidates.values() if c.widens and c.name not in self.names(key)]
             seen = {c.key: [Score(c.key, math.inf, 0.0, {}, {}, np.zeros(0), ((0.0, {}, {}),))] for c in free}
             for s in self.score(key):
-                if s.gain < (LITTLE if not key else 0.0):
+                if s.gain < (self.effort.least if not key else 0.0):
                     break
                 seen.setdefault(self.bench.candidates[s.key].name, []).append(s)
             lists.append([(key, rows[0]) for rows in itertools.islice(seen.values(), each)])
@@ -249,7 +255,7 @@ class Exploration:
             {**parent.refit.values, **setting, **inside(self.bench, candidate, step, setting, parent.refit.values)}
             for _, step, setting in distinct(score, self.effort.starts, whole=not key and self.effort.starts > 1)
         ]
-        return self.weigh((*parent.evidence.keys, score.key), starts)
+        return self.weigh((*parent.evidence.keys, score.key), starts, bench=parent.bench)
 
     def reshape(self, key: frozenset) -> None:
         """Weigh a set in the other forms of its effects, from form to neighbouring form as long as that gains."""
@@ -264,7 +270,7 @@ class Exploration:
                         continue
                     starts = [{**parent.refit.values, **s} for s in self.bench.candidates[new].grid]
                     most = self.effort.starts + 1 if len(order) == 1 else self.effort.starts
-                    self.weigh(order, starts[:most])
+                    self.weigh(order, starts[:most], bench=parent.bench)
 
     def lost(self, form: str) -> bool:
         """Whether a form, weighed alone, was far behind another form of its effect."""
@@ -276,12 +282,30 @@ class Exploration:
         """Whether two sets hold the same effects."""
         return self.names(a) == self.names(b) and len(a) == len(b)
 
+    def settle(self, size: int) -> None:
+        """Weigh the sets near the top anew with predictions that are exact at their fits, where those were corrected.
+
+        Sets are tried with the correction of the set they grew from; what is judged has its own.
+        """
+        while left := [k for k in self.near(size) if not self.weighed[k].settled]:
+            w = self.weighed[left[0]]
+            self._tell("settling", w.evidence.keys)
+            effort = {"rounds": self.effort.rounds, "iterations": self.effort.iterations}
+            self.weighed[left[0]] = weigh(
+                self.scales, w.evidence.keys, w.refit.values, self.criteria, v=w.v, bench=w.bench, **effort
+            )
+
+    def _tell(self, stage: str, order: Sequence[str]) -> None:
+        """Report what is done now, and the best so far."""
+        best = " + ".join(sorted(self.names(self.best))) if self.weighed else ""
+        self.report(f"{stage} {' + '.join(order) or 'base model'}; best so far: {best or 'base model'}")
+
     def leave_out(self, key: frozenset) -> None:
         """Weigh the set without each of its effects, from where it came to rest."""
         parent = self.weighed[key]
         for k in parent.evidence.keys if len(key) > 1 else ():
             order = tuple(x for x in parent.evidence.keys if x != k)
-            self.weigh(order, [parent.refit.values], v=parent.v)
+            self.weigh(order, [parent.refit.values], v=parent.v, bench=parent.bench)
 
 
 def explore(
@@ -303,8 +327,10 @@ def explore(
     """
     criteria, effort = criteria or Criteria(), effort or Effort()
     start = {p: bench.start[p] for p in bench.base}
+    if report:
+        report("fitting the base model")
     bench = bench.anchored(start)
-    scales = scaled(bench, cut, of, bench.y, start)
+    scales = scaled(bench, cut, of, bench.y, start, criteria)
     e = Exploration(bench, criteria, effort, scales, report or (lambda _: None))
     base = weigh(scales, (), start, criteria)
     if not np.isfinite(base.evidence.log_evidence):
@@ -313,11 +339,13 @@ def explore(
             "parameters tried; name another --energy, or leave out the samples of largest strain"
         )
     scales.values, scales.reference = base.refit.values, scales.cut.mean(base.refit.prediction)
-    scales.bench = e.bench = bench.anchored(base.refit.values)
+    scales.bench = e.bench = (base.bench or bench).anchored(base.refit.values).rooted(base.refit.values)
+    scales.bench.free = bench.free  # without the priors of a set
     e.weighed[frozenset()] = base
     e.extend([frozenset()], effort.singles, effort.singles)
     for key in e.near(1)[: effort.reshaped[0]]:
         e.reshape(key)
+    e.settle(1)
     for size, most in ((1, effort.pairs), (2, effort.triples)):
         parents = e.parents(size)[: effort.parents[size - 1]]
         if size >= effort.most or not parents or (size == 2 and len(e.best) < 2 and not e.strange):
@@ -327,16 +355,29 @@ def explore(
         e.extend(parents, most, max(most // len(parents), 1) + 2)
         for key in e.near(size + 1)[: effort.reshaped[size]]:
             e.reshape(key)
+        e.settle(size + 1)
         e.leave_out(e.best)
+        e.settle(size)
     return e
 
 
-def scaled(bench: Bench, cut: Blocks, of: Discrepancy, prediction: np.ndarray, values: Mapping[str, float]) -> Scales:
+def scaled(
+    bench: Bench,
+    cut: Blocks,
+    of: Discrepancy,
+    prediction: np.ndarray,
+    values: Mapping[str, float],
+    criteria: Criteria | None = None,
+) -> Scales:
     """The scales of a sample about the base's fit."""
+    criteria = criteria or Criteria()
     sigma = cut.spread(bench.sigma)
     edges = np.flatnonzero(np.diff(cut.owner, prepend=-1))
     rows = tuple(slice(int(a), int(b)) for a, b in zip(edges, [*edges[1:], len(sigma)], strict=True))
     peak = max(float(np.quantile(np.abs(bench.y[s.rows]), 0.98)) for s in bench.segments) or 1.0
-    made = Scales(bench, of, (), cut, Blocked(rows, sigma), values, cut.mean(prediction), peak)
+    shared = None if bench.shared is None else bench.shared[cut.owner[[r.start for r in rows]]]
+    made = Scales(bench, of, (), cut, Blocked(rows, sigma, shared), values, cut.mean(prediction), peak)
+    if bench.costly:
+        made.size = np.maximum(peak, criteria.unseen / criteria.negligible * cut.mean(bench.sigma))
     made.families = tuple(p.family for p in made.about(bench.sigma, bench))
     return made

@@ -79,16 +79,19 @@ class Marginal:
 
 @dataclass(frozen=True)
 class Blocked:
-    """Which rows belong to which block of D, and the noise on its diagonal."""
+    """Which rows belong to which block of D, the noise on its diagonal, and by block what all its rows err by alike."""
 
     rows: tuple[slice, ...]
     sigma: Float[np.ndarray, " N"]
+    shared: Float[np.ndarray, " B"] | None = None
 
     def within(self, parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> list[Float[np.ndarray, "n n"]]:
         """The blocks of D."""
         out = []
         for i, rows in enumerate(self.rows):
             block = np.diag(self.sigma[rows] ** 2)
+            if self.shared is not None:
+                block += self.shared[i] ** 2
             for part, x in zip(parts, v, strict=True):
                 if part.within is not None and x > 0:
                     block += x * part.within[i]

@@ -9,7 +9,7 @@ Positive shapes have normal priors of their logarithms. Fit and amplitudes of th
 
 import copy
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,17 +24,20 @@ from tissuejax.diagnosis.judgement.evidence import SetEvidence
 from tissuejax.diagnosis.judgement.marginal import (
     Blocked,
     Linear,
+    Marginal,
     Widths,
     amplitude_mass,
     amplitudes,
     smooth,
 )
+from tissuejax.diagnosis.judgement.rest import beyond, numerical, rest, wobble
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.refit import Descent, Refit, refit
 from tissuejax.estimation.discrepancy import Discrepancy, Part
 
 ROUNDS = 4  # of fit and amplitudes in turn
 SETTLED = 0.1  # nats: a round that gains less is the last
+FELT = 1e-6  # of the peak: what is no rounding, by its slope
 NOTHING = 1e-12  # of the peak: a change of the stress that is rounding
 
 
@@ -50,6 +53,7 @@ class Scales:
         values: the base fit, where the sizes of effects are taken.
         reference: the stress that it predicts, block means, Pa.
         peak: the largest stress, Pa.
+        size: against which the rest is measured, by block: the peak, or what noise makes of it (`Criteria.unseen`).
     """
 
     bench: Bench
@@ -60,13 +64,14 @@ class Scales:
     values: Mapping[str, float]
     reference: Float[np.ndarray, " M"]
     peak: float
+    size: Float[np.ndarray, " M"] | None = None
 
     def about(self, prediction: Float[np.ndarray, " N"], bench: Bench) -> tuple[Part, ...]:
         """The discrepancy's parts beside a prediction (a long vector), and what the simulation has wrong there."""
         parts = self.discrepancy.about(np.nan_to_num(self.cut.mean(prediction)))
         if bench.numerical is None:
             return parts
-        return (*parts, Part("numerical", "numerical", self.cut.mean(bench.numerical)))
+        return (*parts, *(Part(name, "numerical", self.cut.mean(x)) for name, x in bench.numerical.items()))
 
     def priors(self, criteria: Criteria, keys: Sequence[str] = ()) -> Widths:
         """Prior of the amplitudes where the effects `keys` act.
@@ -119,6 +124,7 @@ class Weighed:
         v: squared amplitudes of the parts.
         parts: of the discrepancy, about the fit.
         rest: the discrepancy's posterior mean over the blocks, Pa.
+        bench: that it was weighed on; `settled`: whether its predictions are exact at the fit.
     """
 
     evidence: SetEvidence
@@ -126,13 +132,15 @@ class Weighed:
     v: Float[np.ndarray, " K"]
     parts: tuple[Part, ...]
     rest: Float[np.ndarray, " M"]
+    bench: Bench | None = None
+    settled: bool = True
 
 
 def with_priors(
-    scales: Scales, keys: Sequence[str], start: Mapping[str, float], criteria: Criteria
+    scales: Scales, keys: Sequence[str], start: Mapping[str, float], criteria: Criteria, bench: Bench | None = None
 ) -> tuple[Bench, dict[str, tuple[float, float]]]:
     """The bench with priors on everything that the set frees, and those priors in the coordinates of a descent."""
-    bench, free, priors = scales.bench, dict(scales.bench.free), {}
+    bench, free, priors = bench or scales.bench, dict(scales.bench.free), {}
     for key in keys:
         c = bench.candidates[key]
         sizes = scales.effect_size(c, {**bench.start, **start}, criteria)
@@ -186,24 +194,28 @@ def weigh(
     rounds: int = ROUNDS,
     iterations: int = 12,
     floor: float = -math.inf,
+    bench: Bench | None = None,
+    anchor: bool = True,
 ) -> Weighed:
     """Fit the set `keys` from `start` and weigh it.
 
     Args:
+        bench: where a cheap simulation is corrected, with the correction to begin with; that of the base by default.
+        anchor: whether the correction is taken anew where the fit comes to rest.
         v: squared amplitudes to begin with; of their prior's size by default.
         floor: log evidence below which the set is hopeless and not followed further.
     """
     names = scales.bench.fitted
     widths = scales.priors(criteria, keys)
     anew, v = v is None, widths.width**2 if v is None else v
-    bench, priors = with_priors(scales, keys, start, criteria)
+    bench, priors = with_priors(scales, keys, start, criteria, bench)
     y, best = scales.cut.mean(bench.y), None
     at, tolerance, raw = dict(start), 0.5, None
-    bench = bench.anchored(at)
+    bench = bench.anchored(at) if anchor else bench
     parts = scales.about(bench.predict(at), bench)
     for _turn in range(rounds):
         misfit = Whitening(bench, scales.cut, scales.blocked, parts, v)
-        seed = None if raw is None else misfit.whiten_means(raw)
+        seed = None if raw is None or bench.costly else misfit.whiten_means(raw)
         fit = refit(bench, misfit, keys, at, iterations=iterations, tolerance=tolerance, errors=False, seed=seed)
         if not np.isfinite(fit.chi2):
             break
@@ -217,7 +229,7 @@ def weigh(
         jac = raw * np.where(descent.log, [fit.values[p] for p in descent.paths], 1.0)
         if not np.isfinite(squared(jac / scales.blocked.sigma[:, None])):
             break  # a prediction without a slope, or with one beyond all numbers: no density is to be had there
-        near = bench.anchored(fit.values)
+        near = bench.anchored(fit.values) if anchor else bench
         if near is not bench:
             bench, fit = near, replace(fit, prediction=near.predict(fit.values))
         if not np.isfinite(squared(fit.prediction)):
@@ -230,9 +242,8 @@ def weigh(
         dead = np.max(np.abs(jac), axis=0, initial=0.0) * descent.scale <= NOTHING * scales.peak
         inner = ~bound & ~(dead & (weak == 0))
         linear = Linear(residual, jac[:, inner], offset[inner], weak[inner])
-        if anew:
-            v, anew = amplitudes(linear, parts, widths.widest, scales.blocked, v, tolerance=SETTLED)[0], False
-        v, m = amplitudes(linear, parts, widths, scales.blocked, v)
+        v, m = _amplitudes(linear, parts, widths, scales.blocked, v, anew, bench.costly)
+        anew = False
         value = m.value + 0.5 * int(np.sum(inner)) * math.log(2 * math.pi)
         value += sum(
             log_prior(bench.free[p], a, q) + 0.5 * w * o * o
@@ -245,15 +256,27 @@ def weigh(
         total = value + held + occam
         if best is None or total > best[0] + 1e-6:
             gained = math.inf if best is None else total - best[0]
-            best = (total, value + held, occam, fit, v, m, bound, descent, residual, parts, bench)
+            felt = dict(zip(descent.paths, np.max(np.abs(raw), axis=0), strict=True))
+            best = (total, value + held, occam, fit, v, m, bound, descent, residual, parts, bench, felt, linear)
         else:
             break
         if gained < SETTLED or total < floor:
             break
-        at, tolerance = dict(fit.values), 0.1
+        at, tolerance = dict(fit.values), tolerance if bench.costly else 0.1
     if best is None:
         return _impossible(scales, keys)
-    return _described(scales, keys, best)
+    return replace(_described(scales, keys, best), settled=anchor)
+
+
+def _amplitudes(linear, parts, widths: Widths, blocked, v, anew: bool, both: bool) -> tuple[np.ndarray, Marginal]:
+    """`amplitudes` from `v`; anew also from where all is wide that may be: alone, or beside that from `v`."""
+    tried = []
+    if anew:
+        wide = amplitudes(linear, parts, widths.widest, blocked, v, tolerance=SETTLED)[0]
+        tried.append(amplitudes(linear, parts, widths, blocked, wide))
+    if both or not anew:
+        tried.append(amplitudes(linear, parts, widths, blocked, v))
+    return max(tried, key=lambda t: t[1].value + float(np.sum(widths.log_shape(t[0] / widths.width**2))))
 
 
 def _on_bounds(scales, parts, v, residual, jac, x, descent, bound, weak, offset) -> float:
@@ -296,8 +319,9 @@ def _impossible(scales: Scales, keys: Sequence[str]) -> Weighed:
 
 
 def _described(scales: Scales, keys: Sequence[str], best: tuple) -> Weighed:
-    total, value, occam, fit, v, m, bound, descent, residual, parts, bench = best
-    smoothed, scatter = _rest(scales, parts, v, residual, scales.widened(keys))
+    total, value, occam, fit, v, m, bound, descent, residual, parts, bench, felt, linear = best
+    smoothed, scatter = rest(scales, parts, v, residual, scales.widened(keys))
+    left, open_still = beyond(scales, linear, smoothed, scatter)
     chi2 = float(np.sum((residual / scales.blocked.sigma) ** 2))
     before = scales.cut.mean(bench.y - scales.bench.predict(scales.values)) / scales.blocked.sigma
     n = len(residual)
@@ -306,7 +330,7 @@ def _described(scales: Scales, keys: Sequence[str], best: tuple) -> Weighed:
     at_bound = tuple(p for p, b in zip(descent.paths, bound, strict=True) if b)
     void = any(
         _resting(bench.candidates[k], fit, bench, at_bound, v, scales.families)
-        or _idle(bench.candidates[k], fit, bench, scales.peak)
+        or _idle(bench.candidates[k], fit, bench, scales.peak, felt)
         for k in keys
     )
     own = 0.5 * float(np.linalg.slogdet(m.precision)[1]) if len(m.precision) else 0.0
@@ -326,16 +350,10 @@ def _described(scales: Scales, keys: Sequence[str], best: tuple) -> Weighed:
         n=n,
         kurtosis=float(kurtosis(whitened)),
         explained=float(np.clip(1 - max(chi2 - n, 0.0) / base, -1.0, 1.0)),
-        rest=(float(np.mean(smoothed**2 + scatter)) / scales.peak**2, _wobble(smoothed, scatter, scales.peak)),
-        numerical=_numerical(scales, parts, v),
+        rest=(float(np.mean(left**2 + open_still)), wobble(left, open_still, 1.0)),
+        numerical=numerical(scales, parts, v),
     )
-    return Weighed(evidence, fit, v, parts, smoothed)
-
-
-def _numerical(scales: Scales, parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> float:
-    """Root mean square of what is laid to mesh and step, a share of the peak."""
-    squares = [x * np.mean(np.sum(p.factor**2, axis=1)) for p, x in zip(parts, v, strict=True) if p.name == "numerical"]
-    return math.sqrt(float(sum(squares))) / scales.peak
+    return Weighed(evidence, fit, v, parts, left * (scales.peak if scales.size is None else scales.size), bench)
 
 
 def _resting(c: Candidate, fit: Refit, bench: Bench, at_bound: Sequence[str], v: np.ndarray, families) -> bool:
@@ -346,42 +364,12 @@ def _resting(c: Candidate, fit: Refit, bench: Bench, at_bound: Sequence[str], v:
     return all(p in at_bound and n for p, n in zip(c.amplitudes, near, strict=True))
 
 
-def _idle(c: Candidate, fit: Refit, bench: Bench, peak: float) -> bool:
+def _idle(c: Candidate, fit: Refit, bench: Bench, peak: float, felt: Mapping[str, float]) -> bool:
     """Whether the fit predicts the same without a candidate: it may do something, and does nothing here."""
     if not c.amplitudes:
         return False
+    moved = max(felt.get(p, 0.0) * abs(fit.values[p] - bench.start[p]) for p in c.amplitudes)
+    if bench.costly and moved > FELT * peak:  # its slope tells without another simulation
+        return False
     without = bench.predict({**fit.values, **{p: bench.start[p] for p in c.amplitudes}})
     return bool(np.max(np.abs(without - fit.prediction)) <= NOTHING * peak)
-
-
-def _rest(
-    scales: Scales,
-    parts: Sequence[Part],
-    v: Float[np.ndarray, " K"],
-    residual: Float[np.ndarray, " M"],
-    named: Collection[str],
-):
-    """Posterior mean and variance of the discrepancy at the blocks, without scatter from sample to sample, without
-    what has a name and without the known error of a simulation (the variance is that of all together)."""
-    white = np.array([p.family == "white" for p in parts])
-    noise = Blocked(scales.blocked.rows, scales.blocked.sigma)
-    inverse = [np.linalg.inv(b) for b in noise.within(parts, v)]
-    u = smooth(parts, v)
-    light = np.concatenate([i @ residual[r] for i, r in zip(inverse, noise.rows, strict=True)])
-    g = np.concatenate([i @ u[r] for i, r in zip(inverse, noise.rows, strict=True)])
-    inner = np.linalg.inv(np.eye(u.shape[1]) + u.T @ g)
-    w = light - g @ (inner @ (g.T @ residual))
-    # y = d + e with var(e) = N: mean of d is y - N K^-1 y, its variance N - N K^-1 N
-    scattered = noise.within([p for p, x in zip(parts, white, strict=True) if x], v[white])
-    errors = np.concatenate([np.diag(s) for s in scattered])
-    own = np.concatenate([np.diag(i) for i in inverse]) - np.sum((g @ inner) * g, axis=1)
-    known = [
-        x * p.factor @ (p.factor.T @ w) for p, x in zip(parts, v, strict=True) if p.family in {"numerical", *named}
-    ]
-    return residual - errors * w - sum(known), np.maximum(errors - errors**2 * own, 0.0)
-
-
-def _wobble(mean: np.ndarray, variance: np.ndarray, peak: float) -> float:
-    """Standard deviation of the mean square of a normal vector, entries taken in independent tens."""
-    each = 2 * variance**2 + 4 * variance * mean**2
-    return math.sqrt(10 * float(np.sum(each))) / len(mean) / peak**2

@@ -1,0 +1,44 @@
+"""Probings of a small box diagnosed from end to end, as their view is weighed."""
+
+import numpy as np
+import pytest
+
+from tests.probing.bench import VALUES, measured, recording, sample
+from tissuejax.diagnosis.diagnose import PROBING
+from tissuejax.diagnosis.judgement.answer import Answered, answer
+from tissuejax.diagnosis.probing import ProbingBench
+from tissuejax.diagnosis.probing_view import ProbingView, probing_blocks, probing_discrepancy
+from tissuejax.energies.catalogue import energy
+from tissuejax.recordings.recording import Sample
+
+SETTINGS = {"counts": (12, 12, 5), "core": 0.007, "compression": 1.5, "interval": 0.04, "step": 4e-4, "processes": 1}
+NAMES = ["contact-offset", "force-drift", "registration"]
+TWO = sample(recording("a"), recording("b", place=(-0.004, 0.004), depth=2.5e-3))
+
+
+def diagnosed(**more: float) -> Answered:
+    """Two recordings as a slower and finer simulation predicts them, with noise, and the answer to them."""
+    law, rng = energy("reduced-polynomial-2"), np.random.default_rng(4)
+    fine = ProbingBench.of(TWO, law, ("a", "b"), (), NAMES, **SETTINGS | {"compression": 1.0, "counts": (14, 14, 6)})
+    told = fine.runs._predictor("fine", tuple(more.items())).predict(VALUES | more)
+    made = {n: measured(told[n], r, rng) for n, r in TWO.recordings.items()}
+    own = ProbingBench.of(
+        Sample(TWO.name, made, geometry=TWO.geometry, density=TWO.density), law, ("a", "b"), (), NAMES, **SETTINGS
+    )
+    whole, shown = ProbingView.of(own), ProbingView.of(own.narrowed(("a",), ("b",), NAMES))
+    cut = probing_blocks(whole)
+    found = answer(shown, whole, cut, probing_discrepancy(whole, cut), PROBING)
+    found.simulations = own.runs.count
+    return found
+
+
+@pytest.mark.parametrize(("more", "names"), [({}, ()), ({"effects.force-drift.rate_z": 0.02}, ("force-drift",))])
+def test_a_probing_is_diagnosed_for_few_simulations(more, names):
+    found = diagnosed(**more)
+    assert found.judgement.names == names
+    assert found.simulations < 250
+    assert sum(found.judgement.probabilities.values()) == pytest.approx(1.0)
+    assert found.chosen.values["energy.C10"] == pytest.approx(VALUES["energy.C10"], rel=0.2)
+    for path, std in found.chosen.std.items():
+        true = (VALUES | more).get(path)
+        assert true is None or abs(found.chosen.values[path] - true) < 4 * std, path

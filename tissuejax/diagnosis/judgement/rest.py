@@ -1,0 +1,69 @@
+"""What a set leaves beside noise: the discrepancy's posterior, its size, and what of it is laid to a simulation."""
+
+import math
+from collections.abc import Collection, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Float
+
+from tissuejax.diagnosis.judgement.marginal import Linear, smooth
+from tissuejax.estimation.discrepancy import Part
+
+if TYPE_CHECKING:
+    from tissuejax.diagnosis.judgement.weigh import Scales
+
+
+def beyond(scales: "Scales", linear: Linear, smoothed: np.ndarray, scatter: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The rest and its variance over the size; of a simulation, what its parameters could not take up as well.
+
+    Few recordings of a simulation with a wide law hold neither parameters nor law along what they share.
+    """
+    if scales.size is None:
+        return smoothed / scales.peak, scatter / scales.peak**2
+    left, slopes = smoothed / scales.size, linear.jacobian / scales.size[:, None]
+    return left - slopes @ np.linalg.lstsq(slopes, left, rcond=None)[0], scatter / scales.size**2
+
+
+def rest(
+    scales: "Scales",
+    parts: Sequence[Part],
+    v: Float[np.ndarray, " K"],
+    residual: Float[np.ndarray, " M"],
+    named: Collection[str] = (),
+):
+    """Posterior mean and variance of the discrepancy at the blocks, without scatter from sample to sample, without
+    what has a name and without the known error of a simulation (the variance is that of all together)."""
+    white = np.array([p.family == "white" for p in parts])
+    noise = scales.blocked
+    inverse = [np.linalg.inv(b) for b in noise.within(parts, v)]
+    u = smooth(parts, v)
+    light = np.concatenate([i @ residual[r] for i, r in zip(inverse, noise.rows, strict=True)])
+    g = np.concatenate([i @ u[r] for i, r in zip(inverse, noise.rows, strict=True)])
+    inner = np.linalg.inv(np.eye(u.shape[1]) + u.T @ g)
+    w = light - g @ (inner @ (g.T @ residual))
+    # y = d + e with var(e) = N: mean of d is y - N K^-1 y, its variance N - N K^-1 N
+    scattered = noise.within([p for p, x in zip(parts, white, strict=True) if x], v[white])
+    meant, wide = residual.copy(), np.empty(len(residual))
+    for n, i, r in zip(scattered, inverse, noise.rows, strict=True):
+        meant[r] -= n @ w[r]
+        own = i - (g[r] @ inner) @ g[r].T
+        wide[r] = np.diag(n) - np.einsum("ij,jk,ki->i", n, own, n)
+    known = [
+        x * p.factor @ (p.factor.T @ w) for p, x in zip(parts, v, strict=True) if p.family in {"numerical", *named}
+    ]
+    return meant - sum(known), np.maximum(wide, 0.0)
+
+
+def wobble(mean: np.ndarray, variance: np.ndarray, peak: float) -> float:
+    """Standard deviation of the mean square of a normal vector, entries taken in independent tens."""
+    each = 2 * variance**2 + 4 * variance * mean**2
+    return math.sqrt(10 * float(np.sum(each))) / len(mean) / peak**2
+
+
+def numerical(scales: "Scales", parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> float:
+    """Root mean square of what is laid to mesh and step, a share of the peak."""
+    squares = [
+        x * np.mean(np.sum(p.factor**2, axis=1)) for p, x in zip(parts, v, strict=True) if p.family == "numerical"
+    ]
+    return math.sqrt(float(sum(squares))) / scales.peak
