@@ -303,7 +303,7 @@ class Exploration:
     def leave_out(self, key: frozenset) -> None:
         """Weigh the set without each of its effects, from where it came to rest."""
         parent = self.weighed[key]
-        for k in parent.evidence.keys if len(key) > 1 else ():
+        for k in parent.evidence.keys if len(key) > 1 or self.bench.costly else ():
             order = tuple(x for x in parent.evidence.keys if x != k)
             self.weigh(order, [parent.refit.values], v=parent.v, bench=parent.bench)
 
@@ -346,6 +346,8 @@ def explore(
     for key in e.near(1)[: effort.reshaped[0]]:
         e.reshape(key)
     e.settle(1)
+    if bench.costly:  # one start was all that the base had
+        e.leave_out(e.best)
     for size, most in ((1, effort.pairs), (2, effort.triples)):
         parents = e.parents(size)[: effort.parents[size - 1]]
         if size >= effort.most or not parents or (size == 2 and len(e.best) < 2 and not e.strange):
