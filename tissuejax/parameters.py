@@ -75,3 +75,8 @@ def checked(values: Mapping[str, float], declared: Mapping[str, Parameter]) -> d
         if not math.isfinite(value) or not p.lower <= value <= p.upper:
             raise InputError(f"{path} = {value} {p.unit}: allowed is {p.lower} to {p.upper} {p.unit}; change the value")
     return dict(values)
+
+
+def begun(text: str) -> str:
+    """A sentence with its first letter large, unless it begins with a parameter's path."""
+    return text if "." in text.split(" ", 1)[0] else text[0].upper() + text[1:]

@@ -7,6 +7,7 @@ import numpy as np
 
 from tissuejax.fitting.memory import begun_loaded, times
 from tissuejax.fitting.stability import sentence
+from tissuejax.parameters import begun
 
 if TYPE_CHECKING:
     from tissuejax.fitting.result import Fit
@@ -33,7 +34,7 @@ def warnings_of(found: "Fit") -> list[str]:
         limit = lower if side == "lower" else upper
         unit = problem.predictor.model.parameters[path].unit
         said.append(f"{path} ended at its {side} bound ({limit:g} {unit}); its standard error means little there.")
-    said += [text[0].upper() + text[1:] for text in found.uncertainty.sentences]
+    said += [begun(text) for text in found.uncertainty.sentences]
     said += [text] if (text := sentence(found.stability)) else []
     if times(problem.predictor):
         said += begun_loaded(problem.predictor.sample.recordings, problem.predictor.names, problem.noise)

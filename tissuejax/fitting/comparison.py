@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from tissuejax.errors import InputError
+from tissuejax.parameters import begun
 
 if TYPE_CHECKING:
     from tissuejax.fitting.result import Fit
@@ -172,7 +173,7 @@ def _row(name: str, record: Mapping) -> dict:
         "status": record["status"],
         "warnings": tuple(
             [f"{path} at its {p['at_bound']} bound" for path, p in record["parameters"].items() if p["at_bound"]]
-            + [s[0].upper() + s[1:] for s in record["not_identified"]]
+            + [begun(s) for s in record["not_identified"]]
         ),
     }
 

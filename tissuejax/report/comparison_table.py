@@ -67,10 +67,11 @@ class ComparisonBars(Plot):
         left.set_yticks(rows, data.names)
         left.invert_yaxis()
         left.set_xlabel("Akaike weight")
-        right.barh([r - 0.17 for r in rows], data.fitted, height=0.3, color=MODEL, label="fitted")
-        if any(h is not None for h in data.held):
+        aside = 0.17 if any(h is not None for h in data.held) else 0.0
+        right.barh([r - aside for r in rows], data.fitted, height=0.3 if aside else 0.55, color=MODEL, label="fitted")
+        if aside:
             right.barh(
-                [r + 0.17 for r in rows], [h or 0.0 for h in data.held], height=0.3, color=HELD, label="held out"
+                [r + aside for r in rows], [h or 0.0 for h in data.held], height=0.3, color=HELD, label="held out"
             )
         figure.legend(*right.get_legend_handles_labels(), loc="outside lower right", ncols=2, frameon=False, fontsize=8)
         right.set_xlabel(f"root mean square error ({data.unit})")
