@@ -11,15 +11,15 @@ from tissuejax.diagnosis.probing_view import ProbingView, probing_blocks, probin
 from tissuejax.energies.catalogue import energy
 from tissuejax.recordings.recording import Sample
 
-SETTINGS = {"counts": (12, 12, 5), "core": 0.007, "compression": 1.5, "interval": 0.04, "step": 4e-4, "processes": 1}
-NAMES = ["contact-offset", "force-drift", "registration"]
+SETTINGS = {"mesh": "file", "compression": 3.0, "interval": 0.04, "step": 8e-4, "processes": 1}
+NAMES = ["contact-offset", "force-drift"]
 TWO = sample(recording("a"), recording("b", place=(-0.004, 0.004), depth=2.5e-3))
 
 
 def diagnosed(**more: float) -> Answered:
-    """Two recordings as a slower and finer simulation predicts them, with noise, and the answer to them."""
+    """Two recordings as a slower simulation predicts them, with noise, and the answer to them."""
     law, rng = energy("reduced-polynomial-2"), np.random.default_rng(4)
-    fine = ProbingBench.of(TWO, law, ("a", "b"), (), NAMES, **SETTINGS | {"compression": 1.0, "counts": (14, 14, 6)})
+    fine = ProbingBench.of(TWO, law, ("a", "b"), (), NAMES, **SETTINGS | {"compression": 1.5})
     told = fine.runs._predictor("fine", tuple(more.items())).predict(VALUES | more)
     made = {n: measured(told[n], r, rng) for n, r in TWO.recordings.items()}
     own = ProbingBench.of(
@@ -32,7 +32,13 @@ def diagnosed(**more: float) -> Answered:
     return found
 
 
-@pytest.mark.parametrize(("more", "names"), [({}, ()), ({"effects.force-drift.rate_z": 0.02}, ("force-drift",))])
+@pytest.mark.parametrize(
+    ("more", "names"),
+    [
+        ({"effects.force-drift.rate_z": 0.02}, ("force-drift",)),
+        pytest.param({}, (), marks=pytest.mark.slow),
+    ],
+)
 def test_a_probing_is_diagnosed_for_few_simulations(more, names):
     found = diagnosed(**more)
     assert found.judgement.names == names

@@ -175,7 +175,7 @@ def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
     start = {p: v for p, v in weighed.refit.values.items() if p in out.fitting.free}
     bench = out.fitting.anchored(start)
     whitening = Whitening(bench, scales.cut, scales.blocked, weighed.parts, weighed.v, scales.widened(keys))
-    misfit = whitening if keys or bench is not out.fitting else white(bench)
+    misfit = whitening if keys else white(bench)
     fit = refit(bench, misfit, keys, start)
     near = bench.anchored(fit.values)
     if near is not bench:
