@@ -91,6 +91,19 @@ def test_times_lie_between_the_sampling_and_three_lengths():
     assert fixed.start["effects.viscoelasticity.tau1"] == 1e-3
 
 
+def test_a_ramp_that_is_sampled_finely_tells_of_times_below_the_holds_sampling():
+    """2 ms in a ramp of 0.4 s, then 0.5 s: most steps are of the hold."""
+    sample = pulled([(0.35, 8.0)], tops=(1.2,))
+    r = sample.recordings["r1"]
+    time = np.concatenate([np.arange(0, 0.4, 2e-3), np.arange(0.4, 180.0, 0.5)])
+    stretch = np.interp(time, [0, 0.4], [1, 1.2])
+    channel = Channel(time, stress(stretch, [(0.35, 8.0)], time), "Pa", NOISE)
+    uneven = Recording("r1", r.experiment, {"time": time, "stretch": stretch}, {"nominal_stress": channel}, {})
+    model = tj.material("neo-hookean", effects=["viscoelasticity-1"])
+    posed = problem(predictor(model, Sample("s", {"r1": uneven}), ("r1",)))
+    assert posed.bound("effects.viscoelasticity.tau1")[0] == pytest.approx(2e-3)
+
+
 def test_a_fit_with_effects_starts_once_from_each_smaller_model():
     sample = pulled([(0.35, 8.0)], length=30.0)
     model = tj.material("neo-hookean", effects=["viscoelasticity-1", "slack"])

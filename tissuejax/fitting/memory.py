@@ -9,19 +9,23 @@ from tissuejax.fitting.weights import Noise
 from tissuejax.recordings.recording import Recording
 
 LENGTHS = 3.0  # of the longest recording: a slower time is a straight line in it
+FINEST = 0.1  # share of the samples, those closest together, that tell of the shortest times
 LOADED = 4.0  # standard errors of the first samples' mean from which a recording begins under load
 FIRST = 5  # samples
 REST = 0.02  # of the largest drive: nothing is done yet
 
 
 def time_bounds(predictor: Predictor) -> dict[str, tuple[float, float]]:
-    """(lower, upper) of the relaxation times of a model, from the sampling and the length of its recordings, s."""
+    """(lower, upper) of the relaxation times of a model, from the sampling and the length of its recordings, s.
+
+    Where sampling is uneven that of its finest tenth counts: a ramp may be sampled a hundred times as often as a hold.
+    """
     steps, spans = [], []
     for name in predictor.names:
         for channel in predictor.sample.recordings[name].channels.values():
             time = np.asarray(channel.time, float)
             if len(time) > 1 and time[-1] > time[0]:
-                steps.append(float(np.median(np.diff(time))))
+                steps.append(float(np.quantile(np.diff(time), FINEST)))
                 spans.append(float(time[-1] - time[0]))
     if not steps:
         return {}
