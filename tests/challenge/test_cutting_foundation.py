@@ -14,7 +14,7 @@ def cut(thickness, part=2.6, **grid):
     strength = part * TOUGH / thickness
     knife = Knife(thickness, np.tan(np.radians(14)), 80 * strength / thickness)
     made = draw(SLAB, knife, PLACES, lambda x: np.full_like(x, TOUGH), lambda x: np.full_like(x, strength), **grid)
-    return made.force[60:]
+    return made[60:]
 
 
 def test_the_grid_does_not_show_beside_the_noise():
@@ -31,3 +31,19 @@ def test_steady_force_is_toughness_plus_the_squeezed_layers():
     k, half, r = SLAB.wave / SLAB.half, 3e-4, 2.3 * np.e
     layers = k * half**2 + 2 * k * SLAB.hardening * half**3 / (3 * SLAB.half)
     assert force.mean() == pytest.approx(TOUGH * (1 - (1 + r) * np.exp(-r)) + layers, rel=0.003)
+
+
+def test_friction_turns_what_presses_on_bevel_and_flat():
+    """Steady, by hand: normal forces N on bevels of slope t do the work across, so force (E) (1 + m/t) / (1 - m t), E
+    toughness and layers; and 2 m p on each length of flat, p what holds the layer squeezed."""
+    m, strength = 0.1, 12 * TOUGH / (np.e * 6e-4)  # faces that hold nothing any more at the flats
+    knife = Knife(6e-4, np.tan(np.radians(14)), 80 * strength / 6e-4)
+    places = np.concatenate([[-0.003, 0.005], np.arange(0.005, 0.009, 5e-5)])
+    same = dict(toughness=lambda x: np.full_like(x, TOUGH), strength=lambda x: np.full_like(x, strength))
+    plain, rubbed = (draw(SLAB, knife, places, friction=q, **same)[10:] for q in (0.0, m))
+    squeezed = SLAB.wave * 3e-4 / SLAB.half * (1 + SLAB.hardening * 3e-4 / SLAB.half)
+    slope, base = np.polyfit(places[10:], rubbed, 1)
+    assert slope == pytest.approx(2 * m * squeezed, rel=0.05)
+    behind = 3e-4 / knife.slope  # where the flats begin
+    turned = plain.mean() * (1 + m / knife.slope) / (1 - m * knife.slope)
+    assert base + slope * behind == pytest.approx(turned, rel=0.01)

@@ -121,11 +121,8 @@ def _force(t: Trial, slab, knife, G, tau, effect, rng, amount=1.0) -> np.ndarray
         depth = np.where(depth > 0, np.maximum(depth + amount * (4e-4 + 0.02 * t.x), 0), 0)
     elif effect == "settling":
         depth = depth * (1 - np.clip(0.04 * amount * np.log1p(np.maximum(t.time - began, 0) / 1.5), 0, 0.8))
-    found = drawn(slab, knife, t.x, toughness, lambda x: np.full_like(x, tau), notch=t.notch)
-    force = found.force
-    if effect == "blade-friction":
-        force = force + 0.06 * amount * found.pressed * np.tanh(speed / 2e-4)
-    force = force * depth
+    rub = 0.06 * amount * np.tanh(speed / 2e-4) if effect == "blade-friction" else 0.0
+    force = drawn(slab, knife, t.x, toughness, lambda x: np.full_like(x, tau), notch=t.notch, friction=rub) * depth
     if effect == "drift":
         u = (t.time - t.time[0]) / np.ptp(t.time)
         force = force + 0.06 * amount * np.max(np.abs(force)) * (0.5 + u + 0.3 * u**2)

@@ -3,8 +3,9 @@
 Each half of the tissue is a Pasternak foundation (stiffness k = M / W across, shear layer mu W / 3 along the path) that
 hardens with compression; the faces are held together by an exponential law with memory, and pushed apart by a wedge
 with a rounded shoulder. Every position of the blade is an equilibrium, found by Newton's method on a tridiagonal
-system; the force follows from virtual work, 2 sum p w'(s) dx, and friction from the pressures. Nothing is shared with
-the explicit finite elements or the balance of energies that a diagnosis uses.
+system; the force follows from virtual work, 2 sum p w'(s) dx, and friction m turns it: N is what presses on a face of
+slope w', p = N (cos - m sin) of it acts across and N (sin + m cos) along, so 2 sum p (w' + m) / (1 - m w') dx. Nothing
+is shared with the explicit finite elements or the balance of energies that a diagnosis uses.
 """
 
 from typing import NamedTuple
@@ -36,13 +37,6 @@ class Knife(NamedTuple):
     penalty: float
 
 
-class Drawn(NamedTuple):
-    """Force per depth, N/m: parting and wedging, and sum of the pressures over both flats (Pa m)."""
-
-    force: Float[np.ndarray, " n"]
-    pressed: Float[np.ndarray, " n"]
-
-
 def wedge(knife: Knife, s: Float[np.ndarray, " n"]) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
     """Half width of the blade at distance s behind the edge, and its slope; ahead the bevel goes on below zero."""
     half, soft = knife.thickness / 2, 0.05 * knife.thickness
@@ -59,20 +53,22 @@ def draw(
     strength,
     spacing: float = SPACING,
     notch: float = 0.0,
-) -> Drawn:
-    """The force at each place of the edge, in the order given.
+    friction: Float[np.ndarray, " n"] | float = 0.0,
+) -> Float[np.ndarray, " n"]:
+    """Force per depth at each place of the edge, in the order given, N/m.
 
     Args:
         edge: places along x, m; tissue lies from 0 to `slab.length`.
         toughness, strength: J/m^2 and Pa as functions of place. notch: parted up to here from the start.
+        friction: coefficient at each place of the edge, positive where the blade goes on, negative on the way back.
     """
     x = (np.arange(round(slab.length / spacing)) + 0.5) * spacing
     G, tau = toughness(x), strength(x)
     peak = G / (np.e * tau)
     shear = slab.mu * slab.half / 3 / spacing**2
     v, most = np.zeros_like(x), np.where(x < notch, 60 * peak, 0.0)
-    force, pressed = np.zeros(len(edge)), np.zeros(len(edge))
-    before = edge[0]
+    force = np.zeros(len(edge))
+    before, rub = edge[0], np.broadcast_to(friction, len(edge))
     for i, target in enumerate(edge):
         count = max(1, int(np.ceil(abs(target - before) / STRIDE)))
         for place in before + (target - before) * np.arange(1, count + 1) / count:
@@ -81,9 +77,8 @@ def draw(
             most = np.maximum(most, 2 * v)
         before = target
         p = knife.penalty * np.maximum(w - v, 0.0)
-        force[i] = 2 * np.sum(p * slope) * spacing
-        pressed[i] = 2 * np.sum(p) * spacing
-    return Drawn(force, pressed)
+        force[i] = 2 * np.sum(p * (slope + rub[i]) / (1 - rub[i] * slope)) * spacing
+    return force
 
 
 def _balanced(slab, knife, v, w, most, tau, peak, shear):

@@ -11,12 +11,14 @@ from tissuejax.commands.arguments import number
 from tissuejax.commands.command import Command, Reply
 from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.cutting_run import CuttingSettings
-from tissuejax.fitting.cut import FRICTION, CutFit, along, fit_cut
+from tissuejax.fitting.cut import along, fit_cut
 from tissuejax.fitting.cut_resolution import resolution
+from tissuejax.fitting.cut_result import FRICTION, CutFit
 from tissuejax.fitting.sawtooth import SECTIONS, Sawtooth, Settings, mesh_period, sawtooth
 from tissuejax.model import Model
 from tissuejax.parameters import Parameter
 from tissuejax.recordings.files import read
+from tissuejax.recordings.recording import Sample
 from tissuejax.report.cutting import write_cut
 from tissuejax.units import quantity
 from tissuejax.verbs import material
@@ -95,12 +97,15 @@ sum. Units can be written ("4 kPa", "0.4 mm"); plain numbers are SI.
         out = given.out or Path("out") / f"{sample.name}-cut"
         if given.verb == "identify":
             settings = Settings(given.cutoff, given.filter_order, given.prominence)
-            found = {n: sawtooth(sample.recordings[n], sample.geometry, settings) for n in names}
+            found, without = _all_teeth(sample, names, settings)
             period = {n: mesh_period(s, _length(given.h)) for n, s in found.items()} if given.h else {}
             record = {n: _teeth(s) | {"warning": period.get(n)} for n, s in found.items()}
             written = write_cut(out, record, found, sample, None)
-            text = [line for n, s in found.items() for line in _told_teeth(n, s, period.get(n))]
-            return Reply({"identified": record, "files": written}, "\n".join([*text, f"page     {written['page']}"]))
+            text = [line for n, s in found.items() for line in _told_teeth(n, s, period.get(n))] + without
+            return Reply(
+                {"identified": record, "without_teeth": without, "files": written},
+                "\n".join([*text, f"page     {written['page']}"]),
+            )
         made = material(given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect)
         model = Model(made.energy, made.volumetric, made.effects, cohesion=law(given.law))
         if not any(e.name == "blade-friction" for e in model.effects):
@@ -162,6 +167,19 @@ def _values(given, declared) -> dict[str, float]:
                 "by 5 mm are 25 J/m^2"
             )
     return values(given, declared, "--fix or --start")
+
+
+def _all_teeth(sample: Sample, names, settings: Settings) -> tuple[dict[str, Sawtooth], list[str]]:
+    """Teeth of each recording, and a sentence on each that has none; raises the first if none has any."""
+    found, refused = {}, []
+    for name in names:
+        try:
+            found[name] = sawtooth(sample.recordings[name], sample.geometry, settings)
+        except InputError as error:
+            refused.append(error)
+    if not found:
+        raise refused[0]
+    return found, [str(e) for e in refused]
 
 
 def _teeth(found: Sawtooth) -> dict:

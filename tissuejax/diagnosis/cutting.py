@@ -23,14 +23,13 @@ from tissuejax.effects.catalogue import effects, suited
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.volumetric import Quadratic
 from tissuejax.errors import unknown
-from tissuejax.experiments.cutting_record import FORCE, Path
+from tissuejax.experiments.cutting_record import FORCE, steady
 from tissuejax.experiments.predictor import predictor
 from tissuejax.model import Model
 from tissuejax.recordings.recording import Sample
 
 BASE = ("cohesion.energy", "effects.onset.longer", "volumetric.K")
 STIFF = 10.0  # bulk over shear modulus where the tissue is not known
-TURNING = 3.0
 WEDGING = 0.05  # share of the force that the modulus gives to wedging at the start
 
 
@@ -112,24 +111,6 @@ class CuttingBench(Bench):
                 out[s.rows] = np.asarray(self._programs[key](vector))[self._kept[s.recording]]
         self.spent += 1.0 if kind == "run" else 10.0
         return out
-
-
-def steady(path: Path, time: Float[np.ndarray, " m"]) -> np.ndarray:
-    """True where a balance of energies has something to say: not within `TURNING` bevels of a turn of the blade, of the
-    end of a cut made before or of the far side of the tissue, nor within one of the entry."""
-    bevel = 0.5 * path.thickness / np.tan(path.angle / 2)
-    step = np.diff(path.x, prepend=path.x[0])
-    heading = np.sign(np.where(np.abs(step) > 1e-9, step, 0.0))
-    last, since, way = 1.0, np.inf, np.zeros(len(step))
-    for i, (h, d) in enumerate(zip(heading, np.abs(step), strict=True)):
-        turned = h != 0 and h != last
-        last, since = (h, 0.0) if turned else (last, since + d)
-        way[i] = since
-    old = np.maximum.accumulate(np.concatenate([[path.notch], path.front[:-1]]))
-    joining = (np.abs(path.x - old) < TURNING * bevel) & np.isfinite(way)
-    out = (path.x > path.length - bevel) | (np.abs(path.x) < bevel)
-    calm = (way > TURNING * bevel) & (heading != 0) & ~joining & ~out
-    return np.interp(time, path.time, calm) > 0.99
 
 
 def strokes_to_settle(sample: Sample, bench: CuttingBench, verdict) -> list[str]:

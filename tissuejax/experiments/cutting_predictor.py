@@ -1,6 +1,7 @@
 """The predictor of cuts: by the balance of energies (microseconds) or by simulation of a slice."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 import equinox as eqx
@@ -11,6 +12,7 @@ from jaxtyping import Array, Float
 
 from tissuejax.errors import InputError, UnstableSimulation, unknown
 from tissuejax.experiments.cutting import balance_force
+from tissuejax.experiments.cutting_blocks import Blocks
 from tissuejax.experiments.cutting_record import FORCE, Path, drawn, path_of
 from tissuejax.experiments.cutting_run import CuttingSettings, Ran, Slice, prepare, run_slice
 from tissuejax.experiments.homogeneous import local
@@ -30,6 +32,7 @@ class CuttingPredictor(Predictor):
     Attributes:
         by: "balance" or "simulation". settings: of a simulation.
         paths_of: each recording's path. slices: each recording's slice (simulation).
+        lenient, blocks_of: see `prepare`.
     """
 
     name: ClassVar[str] = "cutting"
@@ -41,6 +44,7 @@ class CuttingPredictor(Predictor):
     paths_of: Mapping[str, Path]
     slices: Mapping[str, Slice]
     lenient: bool = eqx.field(static=True, default=False)
+    blocks_of: Mapping[str, Blocks] = eqx.field(default_factory=dict)
 
     @classmethod
     def prepare(
@@ -52,6 +56,7 @@ class CuttingPredictor(Predictor):
         settings: CuttingSettings | None = None,
         start: Mapping[str, float] | None = None,
         lenient: bool = False,
+        blocks: Mapping[str, Blocks] | None = None,
     ) -> "CuttingPredictor":
         """See `predictor`.
 
@@ -59,6 +64,7 @@ class CuttingPredictor(Predictor):
             by: "balance" or "simulation". settings: of a simulation.
             start: values for which a simulation's step and stiffness are chosen (declared ones by default).
             lenient: a run that breaks down is a prediction of NaN (for a descent that tries values) and no error.
+            blocks: of recordings whose force is a mean over blocks of the way (`blocked`).
 
         Raises:
             InputError: no cohesive law or volumetric energy, an unknown way, a recording that can't be cut.
@@ -70,13 +76,22 @@ class CuttingPredictor(Predictor):
         sample, model = drawn(sample), model.across(names)
         paths = {n: path_of(sample.recordings[n], sample.geometry) for n in names}
         settings, slices = settings or CuttingSettings(), {}
-        if by == "simulation":
-            at = model.defaults | dict(start or {})
-            for n in names:
-                slices[n] = prepare(
-                    model.across(()), local(model, at, n), sample.density or DENSITY, paths[n], settings
-                )
-        return cls(model, sample, names, by, settings, paths, slices, lenient)
+        made = cls(model, sample, names, by, settings, paths, slices, lenient, dict(blocks or {}))
+        return made.prepared(start) if by == "simulation" else made
+
+    def prepared(self, start: Mapping[str, float] | None = None) -> "CuttingPredictor":
+        """The same with slices whose step, stiffness and penalty are chosen for `start`. Compiled programs serve both
+        as long as the number of steps is the same.
+
+        Raises:
+            InputError: see `experiments.cutting_run.prepare`.
+        """
+        at, slices = self.model.defaults | dict(start or {}), {}
+        for n in self.names:
+            values = local(self.model, at, n)
+            density = self.sample.density or DENSITY
+            slices[n] = prepare(self.model.across(()), values, density, self.paths_of[n], self.settings)
+        return replace(self, slices=slices)
 
     def of(self, names: Sequence[str]) -> "CuttingPredictor":
         """The same model for other recordings of the sample."""
@@ -103,6 +118,9 @@ class CuttingPredictor(Predictor):
         for effect in reversed(model.ordered):
             channels = effect.channels(under(f"effects.{effect.name}", values), None, channels)
         made = channels[FORCE]
+        if name in self.blocks_of:
+            blocks = self.blocks_of[name]
+            return blocks.mean(jnp.interp(jnp.asarray(blocks.time), made.time, made.values)), ran
         return jnp.interp(jnp.asarray(seen.time), made.time, made.values), ran
 
     def predict(self, values: Values) -> dict[str, Recording]:
@@ -124,21 +142,28 @@ class CuttingPredictor(Predictor):
 
     def jacobian(self, values: Values, paths: Sequence[str]) -> tuple[dict[str, Recording], Tangents]:
         """See `Predictor.jacobian`."""
+        return self.linearised(values, paths)[:2]
+
+    def linearised(
+        self, values: Values, paths: Sequence[str]
+    ) -> tuple[dict[str, Recording], Tangents, dict[str, Ran | None]]:
+        """Prediction, its derivatives, and the simulations behind them, in one program."""
         for path in paths:
             if path not in self.model.parameters:
                 raise unknown("parameter", path, self.model.parameters)
-        recordings, tangents = {}, {path: {} for path in paths}
+        recordings, tangents, runs = {}, {path: {} for path in paths}, {}
         for name in self.names:
             at = local(self.model, values, name)
             generic = [d for p in paths for d in self.model.declared if p in self.model.source_of(d, name)]
             model = self.model.across(()).active(at, generic)
             basis = np.array([[p in self.model.source_of(d, name) for d in model.declared] for p in paths], float)
             force, ran, slopes = _linearised(self, name, at, basis, model)
+            runs[name] = ran
             self._refuse_failed(name, ran)
             recordings[name] = self._reported(name, force)
             for row, path in enumerate(paths):
                 tangents[path][name] = {FORCE: np.asarray(slopes[row])}
-        return recordings, tangents
+        return recordings, tangents, runs
 
     def _reported(self, name: str, force) -> Recording:
         r = self.sample.recordings[name]
@@ -167,7 +192,7 @@ _programs: dict = {}
 
 def _program(predictor: CuttingPredictor, name: str, kind: str, make):
     """Compiled once for each predictor, recording and use; predictors are immutable."""
-    key = (id(predictor.slices), id(predictor.paths_of), name, kind)
+    key = (id(predictor.paths_of), id(predictor.blocks_of), name, kind)
     if key not in _programs:
         kept = (
             jax.jit(make, compiler_options=COMPILER_OPTIONS),

@@ -11,6 +11,7 @@ from tissuejax.recordings.recording import Channel, Geometry, Recording, Sample
 FORCE = "cutting_force"
 ANGLE = 30.0  # degrees between the bevels where a file does not say
 START = 1e-3  # m: a record whose blade is deeper in the tissue than this at its first sample starts in the cut
+TURNING = 3.0  # half widths of a bevel
 FACTOR = 1e-2  # a thickness of more than this in m is not a blade's
 
 
@@ -92,6 +93,24 @@ def path_of(recording: Recording, geometry: Geometry) -> Path:
     return Path(
         time, x, speed, front, fresh, np.where(inside, np.maximum(depth, 0), 0.0), length, thickness, angle, half, notch
     )
+
+
+def steady(path: Path, time: Float[np.ndarray, " m"]) -> np.ndarray:
+    """True where a balance of energies has something to say: not within `TURNING` bevels of a turn of the blade, of the
+    end of a cut made before or of the far side of the tissue, nor within one of the entry."""
+    bevel = 0.5 * path.thickness / np.tan(path.angle / 2)
+    step = np.diff(path.x, prepend=path.x[0])
+    heading = np.sign(np.where(np.abs(step) > 1e-9, step, 0.0))
+    last, since, way = 1.0, np.inf, np.zeros(len(step))
+    for i, (h, d) in enumerate(zip(heading, np.abs(step), strict=True)):
+        turned = h != 0 and h != last
+        last, since = (h, 0.0) if turned else (last, since + d)
+        way[i] = since
+    old = np.maximum.accumulate(np.concatenate([[path.notch], path.front[:-1]]))
+    joining = (np.abs(path.x - old) < TURNING * bevel) & np.isfinite(way)
+    out = (path.x > path.length - bevel) | (np.abs(path.x) < bevel)
+    calm = (way > TURNING * bevel) & (heading != 0) & ~joining & ~out
+    return np.interp(time, path.time, calm) > 0.99
 
 
 def against_motion(recording: Recording) -> Float[np.ndarray, " f"]:

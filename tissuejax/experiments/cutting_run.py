@@ -108,7 +108,7 @@ def prepare(model: Model, values: Mapping[str, float], density: float, path: Pat
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(x)))])
     keep = np.concatenate([[True], np.diff(way) > 1e-9])
     runtime, end = way / SPEED, way[-1] / SPEED
-    frames = max(20, int(np.ceil(way[-1] / (0.5 * h))))
+    frames = max(20, int(np.ceil(way[-1] / (0.25 * h))))  # a turn of the blade takes less than an element
     times = (np.arange(frames) + 0.5) * end / frames
     damping = settings.damping
     if damping is None:

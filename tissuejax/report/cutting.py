@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tissuejax.fitting.cut import CutFit
+from tissuejax.fitting.cut_result import CutFit
 from tissuejax.fitting.sawtooth import SECTIONS, Sawtooth
 from tissuejax.recordings.recording import Sample
 from tissuejax.report.page import png, render

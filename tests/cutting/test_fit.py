@@ -1,0 +1,67 @@
+"""What a fit of cuts compares and finds: means over blocks of the way, the example, starts that are off."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.cutting.records import TRUTH, model, record, sample, simulated, strokes
+from tissuejax.cohesion.catalogue import law
+from tissuejax.energies.neo_hookean import NeoHookean
+from tissuejax.energies.volumetric import Quadratic
+from tissuejax.experiments.cutting_blocks import blocks
+from tissuejax.experiments.cutting_record import path_of
+from tissuejax.fitting.cut import fit_cut
+from tissuejax.fitting.cut_result import ENERGY, FRICTION, STRENGTH
+from tissuejax.model import Model
+from tissuejax.recordings.files import read
+
+EXAMPLE = Path(__file__).parents[2] / "data" / "cut.h5"
+KNOWN = {k: v for k, v in TRUTH.items() if k.startswith(("energy", "volumetric"))}
+
+
+def test_a_ripple_of_the_elements_period_is_in_no_block():
+    time, x = strokes(-0.002, 0.018, 0.008, rate=100.0)
+    made = sample(record("r", time, x, 0 * x), length=0.02)
+    path = path_of(made.recordings["r"], made.geometry)
+    found = blocks(path, time, 1e-3)
+    assert found.samples == 50
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(x)))])
+    for waves in (1, 2, 3):
+        ripple = np.sin(2 * np.pi * waves * way / 1e-3 + 0.3)
+        assert np.abs(np.asarray(found.mean(ripple))[1:-1]).max() < 0.03
+    np.testing.assert_allclose(np.asarray(found.mean(0 * x + 2.5)), 2.5)
+    assert found.count == 30
+
+
+def test_a_rest_is_cut_into_blocks_like_the_moving_blade():
+    time, x = strokes(-0.002, 0.008, rate=100.0)
+    time, x = np.append(time, time[-1] + np.arange(1, 401) / 100), np.append(x, np.full(400, x[-1]))
+    made = sample(record("r", time, x, 0 * x), length=0.02)
+    found = blocks(path_of(made.recordings["r"], made.geometry), time, 1e-3)
+    held = np.bincount(found.block[found.block < found.count])
+    assert held.max() <= found.samples + 1
+    assert found.count >= 10 + 7
+
+
+def test_the_example_is_recovered_by_the_balance():
+    """Its forces come from an implicit foundation model: 20 J/m^2 and friction 0.1 (data/make_cut.py)."""
+    made = Model(NeoHookean(), Quadratic(), (), cohesion=law("bilinear"))
+    known = {"energy.mu": 3000.0, "volumetric.K": 32e3}
+    found = fit_cut(read(EXAMPLE), made, known, names=("there-back-again",), by="balance")
+    assert found.values[ENERGY] == pytest.approx(20.0, rel=0.01)
+    assert found.values[FRICTION] == pytest.approx(0.1, rel=0.02)
+    assert STRENGTH in found.unidentified
+    assert len(found.predicted["there-back-again"].channels["cutting_force"].values) == 481
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("off", [0.5, 1.5])
+def test_a_record_of_a_finer_mesh_is_recovered_from_half_off(off):
+    start = {p: off * TRUTH[p] for p in (STRENGTH, ENERGY, FRICTION)}
+    found = fit_cut(simulated(5e-4, 0.03), model(), KNOWN, start)
+    assert found.status == "converged"
+    assert not found.unidentified
+    assert found.values[ENERGY] == pytest.approx(TRUTH[ENERGY], rel=0.03)
+    assert found.values[STRENGTH] == pytest.approx(TRUTH[STRENGTH], rel=0.15)
+    assert found.values[FRICTION] == pytest.approx(TRUTH[FRICTION], rel=0.05)
