@@ -94,3 +94,21 @@ def cantilever(n: int, seconds: float = 3.0):
         made, held, lambda t: 1.65e-3 * t / seconds, seconds, 150, values, 5e4 / 3, notch=(middle < 0.02).astype(float)
     )
     return scene, lambda t: 2 * 1.65e-3 * t / seconds
+
+
+def peeled(energy: float, youth: float, thick: float, seconds: float = 12.0, h: float = 5e-4):
+    """Two thin arms, 65 mm long and bonded from 15 mm on, whose ends are drawn apart across (T-peel), nu 0; and the way
+    of each end (t)."""
+    far, length = 0.032, 0.065
+    lines = np.arange(round(length / h) + 1) * h
+    made = split(block(lines, across(thick, h), np.array([0, 1e-3])), lambda p: p[:, 1])
+    points = np.asarray(made.geometry.points)
+    held = np.zeros_like(points)
+    held[:, 2] = 1
+    held[np.isclose(points[:, 0], 0), 1] = 1
+    held[np.isclose(points[:, 0], length), 0] = 1
+    middle = points[made.minus].mean(1)[:, 0]
+    values = {"strength": 1000.0, "energy": energy, "mu": youth / 2, "damping": 10.0}
+    notch = (middle < 0.015).astype(float)
+    scene = _apart(made, held, lambda t: far * t / seconds, seconds, 240, values, youth / 3, notch=notch)
+    return scene, lambda t: far * t / seconds

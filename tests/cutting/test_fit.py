@@ -52,7 +52,18 @@ def test_the_example_is_recovered_by_the_balance():
     assert found.values[ENERGY] == pytest.approx(20.0, rel=0.01)
     assert found.values[FRICTION] == pytest.approx(0.1, rel=0.02)
     assert STRENGTH in found.unidentified
+    assert not found.warnings
     assert len(found.predicted["there-back-again"].channels["cutting_force"].values) == 481
+
+
+@pytest.mark.parametrize("noise", [0.002, None])
+def test_a_record_that_the_model_does_not_follow_is_said_to_be_so(noise):
+    """Teeth of half the force: no one toughness and friction draw them, however well the descent ends."""
+    time, x = strokes(-0.002, 0.026, rate=20.0)
+    force = np.where(x > 0, 0.05 + 0.05 * (np.clip(x, 0, None) / 3e-3 % 1), 0.0)
+    found = fit_cut(sample(record("r", time, x, force, noise=noise)), model(), KNOWN, by="balance")
+    assert "does not describe the record" in found.warnings[0]
+    assert found.record()["warnings"] == found.warnings
 
 
 @pytest.mark.slow
@@ -62,6 +73,7 @@ def test_a_record_of_a_finer_mesh_is_recovered_from_half_off(off):
     found = fit_cut(simulated(5e-4, 0.03), model(), KNOWN, start)
     assert found.status == "converged"
     assert not found.unidentified
+    assert not found.warnings
     assert found.values[ENERGY] == pytest.approx(TRUTH[ENERGY], rel=0.03)
     assert found.values[STRENGTH] == pytest.approx(TRUTH[STRENGTH], rel=0.15)
     assert found.values[FRICTION] == pytest.approx(TRUTH[FRICTION], rel=0.05)

@@ -228,4 +228,4 @@ def _told_fit(found: CutFit) -> list[str]:
         lines.append(f"  blade work not accounted for: {100 * found.balance_error:.2g} % at worst")
     if FRICTION not in found.std:
         lines.append("  friction was fixed")
-    return lines
+    return [*lines, *(f"  ! {said}" for said in found.warnings)]

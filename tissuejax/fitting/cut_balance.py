@@ -10,7 +10,7 @@ from tissuejax.experiments.cutting import layer
 from tissuejax.experiments.cutting_predictor import CuttingPredictor
 from tissuejax.experiments.cutting_record import FORCE, drawn, path_of, steady
 from tissuejax.experiments.predictor import predictor
-from tissuejax.fitting.cut_result import ENERGY, FRICTION, ONSET, STRENGTH, CutFit
+from tissuejax.fitting.cut_result import ENERGY, FRICTION, ONSET, STRENGTH, CutFit, misfit_said
 from tissuejax.fitting.least_squares import descend
 from tissuejax.fitting.setup import problem
 from tissuejax.fitting.uncertainty import uncertainty
@@ -50,9 +50,10 @@ def by_balance(
     if ONSET in free and found[ONSET] > 0.98 * p.model.declared[ONSET].upper:
         why[ENERGY] = "the force is still setting in where the record ends: a longer cut, or a simulation, tells it"
     status, chi2 = "converged" if ended.converged else ended.reason, float(r @ r / len(r))
+    said = misfit_said(chi2, posed)
     none = dict.fromkeys(free, 0.0)
     p = predictor(with_onset, sample, names)  # all of the records, also where they did not count
-    return CutFit(found, std, none, why, chi2, status, ended.n_evaluations, "balance", p, p.predict(found), 0.0)
+    return CutFit(found, std, none, why, chi2, status, ended.n_evaluations, "balance", p, p.predict(found), 0.0, said)
 
 
 def _calm(sample: Sample, names: tuple[str, ...]) -> Sample:

@@ -37,7 +37,8 @@ def write_cut(
         written[name] = write_bytes(out / f"{name}.png", picture)
         shown.append({"name": name, "caption": caption, "png": picture})
     lines = [] if found is None else _rows(found)
-    page = render("cutting.html.j2", title=f"{sample.name}: cut", rows=lines, figures=shown)
+    said = "" if found is None else " ".join(f"Take care: {w}." for w in found.warnings)
+    page = render("cutting.html.j2", title=f"{sample.name}: cut", text=said, rows=lines, figures=shown)
     written["page"] = write_text(out / "report.html", page)
     return written
 
