@@ -6,7 +6,7 @@ import numpy as np
 
 from tissuejax.diagnosis.bench import Bench, Candidate, Free, Segment
 from tissuejax.diagnosis.judgement.answer import Answered, answer
-from tissuejax.diagnosis.judgement.blocks import blocks, series
+from tissuejax.diagnosis.judgement.blocks import blocks, driven_states, series
 from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.estimation.discrepancy import discrepancy
 
@@ -107,5 +107,5 @@ def judged(bench: Bench, effort: Effort | None = None) -> Answered:
     whole = copy.copy(bench)
     whole.fitted, whole.held_out = (*bench.fitted, *bench.held_out), ()
     cut = blocks(whole)
-    of = discrepancy(series(whole, cut, dict.fromkeys(whole.fitted, "spring")), cut.spread(whole.sigma))
+    of = discrepancy(series(whole, cut, driven_states(whole)), cut.spread(whole.sigma))
     return answer(bench, whole, cut, of, effort)

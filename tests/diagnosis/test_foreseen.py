@@ -100,3 +100,17 @@ def test_the_sentence_names_recording_parameter_and_what_to_do():
     assert said.startswith("r3 asks for")
     assert f"b = {r.values['b']:.3g} +- {r.std['b']:.2g}" in said
     assert "fit such a recording too" in said
+
+
+def test_what_no_fitted_recording_moves_is_left_out():
+    """A parameter that only a prior tells of has a standard error, and no derivative in what was fitted."""
+    bench = small_and_large()
+    misfit = white(bench)
+    r = refit(bench, misfit, (), {})
+    (expected,) = foreseen(bench, misfit, r)
+    idle = "relax.tau"  # of a relaxation that takes nothing away
+    assert not np.any(bench.jacobian(r.all, (idle,), bench.fitted))
+    more = dataclasses.replace(r, values={**r.values, idle: 1.0}, std={**r.std, idle: 1.0})
+    (found,) = foreseen(bench, misfit, more)
+    assert found.path == expected.path
+    assert found.std == pytest.approx(expected.std, rel=1 / r.n)  # one parameter more is counted

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from tissuejax.diagnosis.judgement.answer import answer
 from tissuejax.diagnosis.judgement.blocks import blocks, series
 from tissuejax.diagnosis.judgement.explore import Effort
-from tissuejax.diagnosis.material import MaterialBench, modes
+from tissuejax.diagnosis.material import MaterialBench, strain_states
 from tissuejax.energies.catalogue import energy
 from tissuejax.estimation.discrepancy import discrepancy
 from tissuejax.recordings.recording import Channel, Recording, Sample
@@ -73,7 +73,7 @@ def test_two_unlike_families_are_found_from_off_the_axis(bench):
     whole = copy.copy(bench)
     whole.fitted, whole.held_out = (*bench.fitted, *bench.held_out), ()
     cut = blocks(whole)
-    of = discrepancy(series(whole, cut, modes(whole)), cut.spread(whole.sigma))
+    of = discrepancy(series(whole, cut, strain_states(whole)), cut.spread(whole.sigma))
     verdict = answer(bench, whole, cut, of, Effort(most=1))
     assert verdict.judgement.names == ("anisotropy",)
     values = verdict.chosen.values

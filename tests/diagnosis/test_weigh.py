@@ -7,7 +7,7 @@ import pytest
 from spring_bench import FREE, START, Spring, spring
 
 from tissuejax.diagnosis.bench import Candidate, Free
-from tissuejax.diagnosis.judgement.blocks import blocks, series
+from tissuejax.diagnosis.judgement.blocks import blocks, driven_states, series
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.explore import Effort, Exploration, scaled
 from tissuejax.diagnosis.judgement.weigh import weigh
@@ -48,8 +48,7 @@ def bench():
 
 def scales(bench):
     cut, start = blocks(bench), {p: bench.start[p] for p in bench.base}
-    modes = dict.fromkeys(bench.fitted, "shear")
-    of = discrepancy(series(bench, cut, modes), cut.spread(bench.sigma))
+    of = discrepancy(series(bench, cut, driven_states(bench)), cut.spread(bench.sigma))
     out = scaled(bench, cut, of, bench.y, start)
     base = weigh(out, (), start, Criteria())
     out.values, out.reference = base.refit.values, cut.mean(base.refit.prediction)

@@ -13,12 +13,12 @@ from tissuejax.cache.programs import keep_programs
 from tissuejax.diagnosis.cutting import CuttingBench, strokes_to_settle
 from tissuejax.diagnosis.foreseen import OPEN, foreseen
 from tissuejax.diagnosis.judgement.answer import Answered, answer, evidence_file
-from tissuejax.diagnosis.judgement.blocks import blocks, series
+from tissuejax.diagnosis.judgement.blocks import blocks, driven_states, series
 from tissuejax.diagnosis.judgement.evidence import write_evidence
 from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.judgement.judge import Kind
 from tissuejax.diagnosis.known import known_physics, label, tell
-from tissuejax.diagnosis.material import MaterialBench, held_strains, modes
+from tissuejax.diagnosis.material import MaterialBench, strain_states
 from tissuejax.diagnosis.next_experiment import proposals, settling
 from tissuejax.diagnosis.next_probing import probing_proposals
 from tissuejax.diagnosis.offered import HYSTERESIS, SCATTER, offered
@@ -158,10 +158,8 @@ def diagnose(
             of = probing_discrepancy(whole, cut)
         else:
             cut = blocks(whole)
-            homogeneous = kind == "homogeneous"
-            alike = modes(whole) if homogeneous else dict.fromkeys(every, kind)
-            seen = series(whole, cut, alike, held_strains(whole) if homogeneous else None)
-            of = discrepancy(seen, cut.spread(whole.sigma))
+            states = strain_states(whole) if kind == "homogeneous" else driven_states(whole)
+            of = discrepancy(series(whole, cut, states), cut.spread(whole.sigma))
         found = answer(bench, whole, cut, of, effort, noted)
         made = {"homogeneous": _material, "probing": _probing, "cutting": _cutting}[kind](sample, energy, base, found)
     if found.evidence.exhausted:

@@ -102,6 +102,10 @@ def _spread(bench: Bench, misfit: Misfit, r: Refit) -> tuple[tuple[str, ...], Fl
         return (), np.zeros((0, 0))
     fitted = misfit.whiten(bench.jacobian(r.values, paths, bench.fitted), bench.fitted)
     size = np.linalg.norm(fitted, axis=0)
+    told = size > 0  # of fibres that nothing stretches yet, all that is known is a prior
+    paths, fitted, size = tuple(np.array(paths, object)[told]), fitted[:, told], size[told]
+    if not paths:
+        return (), np.zeros((0, 0))
     _, s, v = np.linalg.svd(fitted / size, full_matrices=False)
     return paths, (v.T / s) * np.sqrt(inflation(bench, r.chi2, r.n, r.k)[0]) / size[:, None]
 

@@ -22,6 +22,7 @@ from tissuejax.cache.key import described
 from tissuejax.cache.programs import Kept
 from tissuejax.diagnosis.bench import Bench, Candidate, Free, Segment
 from tissuejax.diagnosis.catalogue import Entry, Sizes, entries
+from tissuejax.diagnosis.judgement.blocks import State, strain
 from tissuejax.diagnosis.periodogram import lines
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.energies.energy import Energy
@@ -147,6 +148,12 @@ class MaterialBench(Bench):
         bench._declare(energy, found)
         bench._size_up()
         return bench
+
+    @property
+    def isotropic(self) -> bool:
+        """Whether the base model, known physics included, knows no direction."""
+        told = {p.split(".")[1] for p in (*self.known, *self.base) if p.startswith("effects.")}
+        return self._energy.isotropic and all(e.effect.isotropic for e in self._entries if e.effect.name in told)
 
     def elsewhere(self, values: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
         """Specimens cut along two axes allow several directions of the fibres; see `Bench.elsewhere`."""
@@ -353,15 +360,21 @@ class MaterialBench(Bench):
         return [{"effects.periodic.frequency": f} for f in lines(series, 3)]
 
 
-def modes(bench: MaterialBench) -> dict[str, tuple]:
-    """By recording, what kind of test it is and along which axes: those alike may share a law."""
-    return {
-        n: (t.mode, float(t.second), float(t.swell), tuple(np.round(t.frame, 6).ravel().tolist()))
-        for n, t in bench._tests.items()
-    }
+def strain_states(bench: MaterialBench) -> list[State]:
+    """The strain of every segment: ln of the stretch along its own axis and of the second one, free faces without
+    change of volume; in shear the amount, and ln of the stretch that it is done at.
 
-
-def held_strains(bench: MaterialBench) -> dict[str, float]:
-    """By recording, the logarithm of the stretch that shear is done at; empty where all are sheared at rest."""
-    found = {n: float(np.log(t.axial)) for n, t in bench._tests.items()}
-    return found if any(found.values()) else {}
+    A base that knows no direction lacks none either: what it has wrong is one function of (own, second) for all kinds
+    of extension and all axes. Else kinds and axes have laws of their own.
+    """
+    out = []
+    for s in bench.segments:
+        t, own = bench._tests[s.recording], strain(s)
+        if t.mode == "biaxial":
+            second = next(strain(o) for o in bench._of[s.recording] if o is not s)
+        else:
+            second = np.full_like(own, np.log(t.axial)) if t.mode == "shear" else float(t.second) * own
+        kind = "shear" if t.mode == "shear" else "extension"
+        axes = (t.mode, float(t.second), s.component, tuple(np.round(t.frame, 6).ravel().tolist()))
+        out.append(State(kind if bench.isotropic else axes, np.stack([own, second], axis=1)))
+    return out

@@ -158,7 +158,8 @@ def offered(
     recording's own (specimens that differ, or a gain that changed: stress and stretch can't tell), a
     rate-independent hysteresis, and a strain energy of a form that no term of the catalogue has: what is smooth in
     stretch, and the same for all recordings of one kind, needs no process to explain it. Where no strain was passed
-    twice, a law of each recording's own is one that fails to carry from one strain to another: that form too.
+    twice, a law of each recording's own is one that fails to carry from one strain to another, and where nothing is
+    unloaded a hysteresis is a law: that form too.
 
     Args:
         names: effects asked for; all by default.
@@ -171,8 +172,10 @@ def offered(
         if names is None or own.name in names:
             kept[own.key] = own
     protocol, why = Protocol.of(sample), {}
-    if LAW.key in kept and not protocol.repeated:
-        kept[LAW.key] = replace(LAW, widens={**LAW.widens, **dict.fromkeys(SCATTER.widens, LAW.widens["law"])})
+    if LAW.key in kept:
+        blind = [own for own in (SCATTER, HYSTERESIS) if not getattr(protocol, needs()[own.name])]
+        more = {family: LAW.widens["law"] for own in blind for family in own.widens}
+        kept[LAW.key] = replace(LAW, widens={**LAW.widens, **more})
     for name, need in sorted(needs().items()):
         if any(c.name == name for c in kept.values()) and not getattr(protocol, need):
             kept = {k: c for k, c in kept.items() if c.name != name}

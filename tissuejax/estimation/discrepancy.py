@@ -6,7 +6,7 @@ the model of Kennedy and O'Hagan (2001), with the parts that rests of material t
 
 | part | form of B |
 |---|---|
-| law | squared exponential in strain (0.5 and 0.12 of the range) times the stress, shared by the recordings of a mode |
+| law | squared exponential in strain (0.5 and 0.12 of the range) times the stress, shared by the series of a mode |
 | gain | constant times the stress, of each recording's own (specimens differ in stiffness, load cells in gain) |
 | own law | squared exponential in strain (0.5) times the stress, of each recording's own (specimens differ in form) |
 | hysteresis | squared exponential in strain (0.4) times a loading state, in three shapes, shared by a mode |
@@ -40,9 +40,9 @@ class Series:
 
     Attributes:
         recording: it belongs to.
-        mode: series that may share a law: kind of test, direction, component.
+        mode: series that share a law: extension or shear; of a base that knows directions, kind, direction, component.
         time: s.
-        strain: ln stretch or shear along every driven direction.
+        strain: ln stretch or shear: along its own direction and the second one.
         states: loading states (`loading_states`), one column a shape.
         peak: typical largest stress of its recording, Pa.
     """

@@ -5,7 +5,7 @@ covariance matrix of all of them stays small. Blocks are short where the specime
 where nothing happens; they depend on the recordings alone, so that all models are compared on the same numbers.
 """
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +40,19 @@ class Blocks:
         return np.sqrt(np.add.reduceat(sigma**2, self.starts)) / self.counts
 
 
+@dataclass(frozen=True)
+class State:
+    """Strain of a segment at every sample.
+
+    Attributes:
+        mode: segments of one mode share what a law lacks: where the strain is the same, so is its share of the stress.
+        strain: ln stretch or amount of shear, in columns.
+    """
+
+    mode: Hashable
+    strain: Float[np.ndarray, "n k"]
+
+
 def path(x: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     """Length of the way so far, 0 to 1; even steps where there is none."""
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(x)))])
@@ -69,33 +82,35 @@ def blocks(bench: Bench, several: Mapping[str, int] | None = None) -> Blocks:
     return Blocks(flat, np.diff(np.append(flat, len(bench.y))), np.array(owner))
 
 
-def series(
-    bench: Bench, cut: Blocks, modes: Mapping[str, object], held: Mapping[str, float] | None = None
-) -> list[Series]:
+def series(bench: Bench, cut: Blocks, states: Sequence[State]) -> list[Series]:
     """The blocks as the discrepancy sees them.
 
     Args:
-        modes: by recording, what kind of test it is.
-        held: by recording, a strain that is not driven but differs between recordings of a mode; none by default.
+        states: of each segment (`driven_states`, or those of a bench that knows more).
     """
     out = []
-    for k, s in enumerate(bench.segments):
+    for k, (s, state) in enumerate(zip(bench.segments, states, strict=True)):
         own = Blocks(cut.starts[cut.owner == k] - s.rows.start, cut.counts[cut.owner == k], np.zeros(0, int))
-        driven = np.stack([strain(o) for o in bench.segments if o.recording == s.recording], axis=1)
-        if held:
-            driven = np.append(driven, np.full((len(driven), 1), held[s.recording]), axis=1)
         peaks = [np.quantile(np.abs(bench.y[o.rows]), 0.98) for o in bench.segments if o.recording == s.recording]
         out.append(
             Series(
                 s.recording,
-                (modes[s.recording], s.component),
+                state.mode,
                 own.mean(s.time),
-                own.mean(driven),
+                own.mean(state.strain),
                 own.mean(loading_states(strain(s))),
                 float(max(peaks)) or 1.0,
             )
         )
     return out
+
+
+def driven_states(bench: Bench) -> list[State]:
+    """Strains as they were driven; recordings of a bench share what a law lacks, component by component."""
+    return [
+        State(s.component, np.stack([strain(o) for o in bench.segments if o.recording == s.recording], axis=1))
+        for s in bench.segments
+    ]
 
 
 def strain(s: Segment) -> Float[np.ndarray, " n"]:
