@@ -28,6 +28,7 @@ def test_a_descent_on_a_curved_valley_reaches_its_floor(start):
 
     class Curve:
         free, base = {}, ()
+        costly = False
         calls = 0
 
         def predict(self, values, recordings=None):
@@ -71,6 +72,7 @@ def test_an_angle_beside_an_axis_does_not_hold_up_the_rest():
 
     class Turned:
         free, base = {"a": Free(0, np.inf, 500, "Pa"), "t": Free(-7, 7, 0.3, "rad")}, ()
+        costly = False
 
         def predict(self, values, recordings=None):
             return values["a"] * x + k * np.cos(values["t"]) ** 2 * x**2
