@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from tissuejax.diagnosis.sigma import sigmas
 from tissuejax.estimation.level import Response, kinks, levels, resolution, rough
+from tissuejax.estimation.sigma import sigmas
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 TIME = np.arange(625) * 0.04

@@ -26,12 +26,12 @@ from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_map import stiffness_maps
 from tissuejax.diagnosis.probing_view import ProbingView, probing_blocks, probing_discrepancy
 from tissuejax.diagnosis.result import Diagnosis
-from tissuejax.diagnosis.sigma import sigmas
 from tissuejax.effects.catalogue import effects as all_effects
 from tissuejax.energies.catalogue import energy as named_energy
 from tissuejax.energies.energy import Energy
 from tissuejax.errors import InputError, unknown
 from tissuejax.estimation.discrepancy import discrepancy
+from tissuejax.estimation.sigma import sigmas
 from tissuejax.experiments.catalogue import experiment
 from tissuejax.model import Model
 from tissuejax.progress import Progress, Silent

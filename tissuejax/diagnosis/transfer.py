@@ -14,8 +14,8 @@ import numpy as np
 from tissuejax.diagnosis.material import MaterialBench
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.refit import Descent
-from tissuejax.diagnosis.sigma import sigmas
 from tissuejax.energies.energy import Energy
+from tissuejax.estimation.sigma import sigmas
 from tissuejax.recordings.recording import Sample
 
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from tissuejax.errors import InputError, NotConverged
+from tissuejax.estimation.sigma import sigmas
 from tissuejax.fitting.advice import warnings_of
 from tissuejax.fitting.gradient_descent import METHODS as GRADIENT_METHODS
 from tissuejax.fitting.gradient_descent import gradient_descent
@@ -29,6 +30,7 @@ from tissuejax.fitting.starts import fitted_moduli, neutral, variations
 from tissuejax.fitting.transforms import chained
 from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
 
+STRESS = "nominal_stress"
 METHODS = ("levenberg-marquardt", *GRADIENT_METHODS)
 CONTRADICTED = 3.5  # standard deviations of chi-square from which the recorded noise is not what the residuals have
 AGAIN = 3  # rounds of re-estimating several unknown noise levels
@@ -152,6 +154,7 @@ def fit(
     if holdout:
         predictions |= problem.predictor.of(holdout).predict(values)
         std |= _holdout_noise(problem, holdout)
+    std |= _own_noise(problem, (*problem.predictor.names, *holdout))
     measured = problem.predictor.sample.recordings
     inside = {name: predictions[name] for name in problem.predictor.names}
     bounds = {p: side for p, side in zip(problem.free, problem.box.at_bound(best.y), strict=True) if side}
@@ -276,6 +279,18 @@ def _holdout_noise(problem: Problem, names: tuple[str, ...]) -> dict[str, float]
             recorded = series.noise_std
             found[f"{name}/{channel}"] = float(recorded) if recorded else fitted.get(channel, 1.0)
     return found
+
+
+def _own_noise(problem: Problem, names: tuple[str, ...]) -> dict[str, float]:
+    """Of material tests without a recorded noise, what the recordings themselves tell of it.
+
+    A misfit in units of the residuals' own scatter is 1 whatever the model lacks; this is what a diagnosis measures by.
+    """
+    recordings = problem.predictor.sample.recordings
+    plain = [n for n in names if STRESS in recordings[n].channels and {"stretch", "shear"} & set(recordings[n].inputs)]
+    plain = [n for n in plain if f"{n}/{STRESS}" not in problem.noise.std or f"{n}/{STRESS}" in problem.noise.groups]
+    found = sigmas(problem.predictor.sample, tuple(plain))[0] if plain else {}
+    return {f"{n}/{STRESS}": s for n, s in found.items()}
 
 
 def _listed(problem: Problem, values: Mapping[str, float]) -> str:

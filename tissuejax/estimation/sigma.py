@@ -27,11 +27,11 @@ def sigmas(
         drive = np.asarray(inputs["shear" if "shear" in inputs else "stretch"], float).reshape(len(c.time), -1)
         values = np.asarray(c.values, float).reshape(len(c.time), -1)
         for i in range(values.shape[1]):
-            with_all = drive[:, min(i, drive.shape[1] - 1)]
-            responses.append(Response(np.asarray(c.time, float), with_all, values[:, i]))
+            with_all, kept = drive[:, min(i, drive.shape[1] - 1)], np.isfinite(values[:, i])
+            responses.append(Response(np.asarray(c.time, float)[kept], with_all[kept], values[kept, i]))
             owners.append(name)
     found = levels(responses)
-    sizes = {name: float(np.sqrt(np.mean(np.asarray(c.values, float) ** 2))) or 1.0 for name, c in unknown.items()}
+    sizes = {name: float(np.sqrt(np.nanmean(np.asarray(c.values, float) ** 2))) or 1.0 for name, c in unknown.items()}
     parts = {name: [x for x, owner in zip(found, owners) if owner == name] for name in unknown}
     for name, own in parts.items():
         out[name] = max(float(np.sqrt(np.mean([x.std**2 for x in own]))), LEAST * sizes[name])
