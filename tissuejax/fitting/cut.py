@@ -75,8 +75,8 @@ def fit_cut(
     Args:
         model: energy, volumetric energy, cohesive law; `blade-friction` is added if it is not there.
         known: what other tests told of the tissue: `energy.*`, `volumetric.*`, and whatever is to stay fixed.
-        start: where to begin; what the balance tells of toughness and friction is tried beside it, with this strength
-            and with one by which faces part at half the blade's thickness. The descent begins with the best of them,
+        start: where to begin; what the balance tells of toughness and friction is tried beside it, and with either a
+            strength by which faces part at half the blade's thickness. The descent begins with the best of them,
             and goes on to the next where it ends in no description of the record.
         names: recordings; all cuts by default.
         by: "simulation", or "balance" (no strength). numerical: add the step between two meshes to the errors.
@@ -101,11 +101,12 @@ def fit_cut(
         return first
     told = linear(first.predictor, first.values, known)
     values = first.values | told | dict(start or {})
-    parting = {}
-    if STRENGTH not in known:  # by which faces part at half the blade's thickness; beyond it they press on the flats
-        thickness = min(p.thickness for p in first.predictor.paths_of.values())
-        parting = {STRENGTH: 4 * (values | told)[ENERGY] / thickness}
-        values = values | parting | dict(start or {})
+    thickness = min(p.thickness for p in first.predictor.paths_of.values())
+
+    def parting(v):  # at half the blade's thickness; faces that hold beyond it press on the flats
+        return v if STRENGTH in known else v | {STRENGTH: 4 * v[ENERGY] / thickness}
+
+    values = parting(values) | {k: v for k, v in (start or {}).items() if k == STRENGTH}
     settings = settings or CuttingSettings()
     sizes = {n: element_size(settings, p) for n, p in first.predictor.paths_of.items()}
     seen, means = blocked(sample, first.predictor.paths_of, sizes)
@@ -114,8 +115,8 @@ def fit_cut(
     free = tuple(p for p in (STRENGTH, ENERGY, FRICTION) if p not in known)
     options = {"by": "simulation", "lenient": True, "blocks": means}
     made = predictor(plain, seen, names, settings=settings, start=values, **options)
-    begun = {tuple(v.values()): v for v in (values, values | told, values | told | parting)}
-    starts = sorted(begun.values(), key=partial(_misfit, made, free))
+    tried = (values, values | told, parting(values), parting(values | told))
+    starts = sorted({tuple(v.values()): v for v in tried}.values(), key=partial(_misfit, made, free))
     best, runs = None, 0
     for values in starts:  # the next only where the better one to begin with led to no description of the record
         posed, ended, settled, spent = _rounds(made.prepared(values), free, values, max_steps)
