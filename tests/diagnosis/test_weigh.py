@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
+from scipy.stats import multivariate_normal
 from spring_bench import FREE, START, Spring, spring
 
 from tissuejax.diagnosis.bench import Candidate, Free
@@ -89,3 +91,17 @@ def test_a_set_that_can_not_be_predicted_is_void_and_not_ranked(bench):
     e.weighed = {frozenset(): base, frozenset({"form"}): found}
     assert e.ranked(1) == []
     assert e.best == frozenset()
+
+
+@pytest.mark.parametrize("iterations", [1, 12])
+def test_the_density_is_that_of_the_parameters_reached(bench, iterations):
+    """Not of those that a straight line leads to from there: the discrepancy moves with what they predict."""
+    on, _ = scales(bench)
+    found = weigh(on, (), {"a": 60.0, "b": -20.0}, Criteria(), rounds=1, iterations=iterations)
+    left = on.cut.mean(bench.y - found.refit.prediction)
+    covariance = block_diag(*on.blocked.within(found.parts, found.v))
+    for part, v in zip(found.parts, found.v, strict=True):
+        if part.factor is not None:
+            covariance += v * part.factor @ part.factor.T
+    expected = multivariate_normal.logpdf(left, cov=covariance, allow_singular=True)
+    assert found.evidence.fit == pytest.approx(expected, abs=0.05)

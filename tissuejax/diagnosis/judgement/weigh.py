@@ -245,6 +245,9 @@ def weigh(
         v, m = _amplitudes(linear, parts, widths, scales.blocked, v, anew, bench.costly)
         anew = False
         value = m.value + 0.5 * int(np.sum(inner)) * math.log(2 * math.pi)
+        # of these parameters, and not of those that a straight line leads to: the parts move with the prediction
+        ahead = 0.0 if bench.costly else 0.5 * float(m.step @ m.precision @ m.step)
+        value -= ahead
         value += sum(
             log_prior(bench.free[p], a, q) + 0.5 * w * o * o
             for p, a, q, w, o in zip(descent.paths, x, prior, weak, offset, strict=True)
@@ -257,10 +260,10 @@ def weigh(
         if best is None or total > best[0] + 1e-6:
             gained = math.inf if best is None else total - best[0]
             felt = dict(zip(descent.paths, np.max(np.abs(raw), axis=0), strict=True))
-            best = (total, value + held, occam, fit, v, m, bound, descent, residual, parts, bench, felt, linear)
+            best = (total, value + held, occam, fit, v, m, ahead, bound, descent, residual, parts, bench, felt, linear)
         else:
             break
-        if gained < SETTLED or total < floor:
+        if gained < SETTLED or total + ahead < floor:
             break
         at, tolerance = dict(fit.values), tolerance if bench.costly else 0.1
     if best is None:
@@ -319,7 +322,7 @@ def _impossible(scales: Scales, keys: Sequence[str]) -> Weighed:
 
 
 def _described(scales: Scales, keys: Sequence[str], best: tuple) -> Weighed:
-    total, value, occam, fit, v, m, bound, descent, residual, parts, bench, felt, linear = best
+    total, value, occam, fit, v, m, ahead, bound, descent, residual, parts, bench, felt, linear = best
     smoothed, scatter = rest(scales, parts, v, residual, scales.widened(keys))
     left, open_still = beyond(scales, linear, smoothed, scatter)
     chi2 = float(np.sum((residual / scales.blocked.sigma) ** 2))
@@ -334,7 +337,7 @@ def _described(scales: Scales, keys: Sequence[str], best: tuple) -> Weighed:
         for k in keys
     )
     own = 0.5 * float(np.linalg.slogdet(m.precision)[1]) if len(m.precision) else 0.0
-    density = m.value + own  # what is left of the evidence when the parameters' width is taken out of it
+    density = m.value - ahead + own  # what is left of the evidence when the parameters' width is taken out of it
     evidence = SetEvidence(
         keys=tuple(keys),
         names=tuple(dict.fromkeys(bench.candidates[k].name for k in keys)),
