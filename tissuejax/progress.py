@@ -93,7 +93,7 @@ class _LineStage(Stage):
 
     def advance(self, steps: int = 1, note: str = "") -> None:
         self._done, self._note = self._done + steps, note or self._note
-        self._lines.told(self)
+        self._lines.write(self)
 
     def __str__(self) -> str:
         of = f" {self._done} of {self._total}" if self._total else ""
@@ -116,7 +116,7 @@ class Lines(Progress):
         """A stage that says where it is when it advances and the last line is old enough."""
         yield _LineStage(self, description, total)
 
-    def told(self, stage: Stage) -> None:
+    def write(self, stage: Stage) -> None:
         """Write the line of a stage if it is time for one."""
         now = time.monotonic()
         if now - self._last >= self._every:

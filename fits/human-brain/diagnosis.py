@@ -31,7 +31,7 @@ def main(folder: Path) -> str:
     many = Specimens(records)
     write_figures(many, folder / "figures")
     write_json(folder / "diagnosis.json", {"tried": list(TRIED), "held_out": HELD, **many.as_dict()})
-    return many.told()
+    return many.sentence()
 
 
 if __name__ == "__main__":

@@ -52,7 +52,7 @@ def main(folder: Path) -> str:
         law, effects = energy(ENERGY), ["viscoelasticity"]
         carried[state] = transfer(found[state][0], law, effects, relaxation).as_dict() if relaxation else None
     write_json(folder / "diagnosis.json", {"held_out": HELD, "states": many.as_dict(), "carried": carried})
-    return many.told()
+    return many.sentence()
 
 
 if __name__ == "__main__":

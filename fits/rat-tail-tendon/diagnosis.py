@@ -60,7 +60,7 @@ def main(folder: Path) -> str:
     law, others = energy(ENERGY), [n for n in samples if n.startswith("relax") and n != SHOWN]
     carried = {n: transfer(samples[n], law, ["viscoelasticity"], relaxation).as_dict() for n in others if relaxation}
     write_json(folder / "diagnosis.json", {"fascicles": many.as_dict(), "relaxation": relaxation, "carried": carried})
-    return many.told()
+    return many.sentence()
 
 
 if __name__ == "__main__":

@@ -65,7 +65,7 @@ def main(folder: Path) -> str:
             write_json(done, {"held_out": HELD, "spread": SPREAD, **Specimens(records).as_dict()})
     many = Specimens(records)
     write_figures(many, folder / "figures")
-    return many.told()
+    return many.sentence()
 
 
 if __name__ == "__main__":

@@ -123,7 +123,7 @@ def test_many_specimens_are_counted(relaxing, stepping):
     assert many.verdicts == {"found": 2, "unexplained": 1}
     assert many.counts == {"relax": 2}
     assert many.first() == {"relax": 2}
-    assert many.told().startswith("a: found, relax; b: unexplained, ")
+    assert many.sentence().startswith("a: found, relax; b: unexplained, ")
     assert many.records["a"]["rmse_over_peak"]["after"]["held_out"] < 0.01
     plot = DiagnosisSpecimens()
     data = plot.prepare(many)

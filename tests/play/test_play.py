@@ -115,7 +115,7 @@ def test_a_page_that_never_draws_gets_few_frames_and_holds_no_other_up():
 
 def test_a_slow_page_hears_what_was_said_while_it_drew():
     async def scenario(server, url):
-        server.session.told = lambda: "pace"
+        server.session.remark = lambda: "pace"
         async with connect(url) as slow:
             await slow.recv()
             for _ in range(4):  # it never draws: a frame comes when patience ends, and with it the word

@@ -34,10 +34,10 @@ def key(*things: object) -> str | None:
     Args:
         things: numbers, texts, arrays, containers, and objects of this package or of the libraries made of such.
     """
-    told, around = described(things), circumstances()
-    if told is None or around is None:
+    things_described, around = described(things), circumstances()
+    if things_described is None or around is None:
         return None
-    return hashlib.sha256(f"{around}\n{settings()}\n{told}".encode()).hexdigest()
+    return hashlib.sha256(f"{around}\n{settings()}\n{things_described}".encode()).hexdigest()
 
 
 def circumstances() -> str | None:

@@ -7,7 +7,7 @@ from concurrent.futures import CancelledError
 from contextlib import suppress
 from typing import ClassVar
 
-from tissuejax.campaign.engine import Engine, Told, work
+from tissuejax.campaign.engine import Engine, Report, work
 from tissuejax.campaign.store import Store
 from tissuejax.campaign.task import Task
 from tissuejax.errors import InputError, NotConverged
@@ -20,7 +20,7 @@ class Dask(Engine):
 
     name: ClassVar[str] = "dask"
 
-    def run(self, store: Store, tasks: list[Task], workers: int, told: Told, where: str | None = None) -> None:
+    def run(self, store: Store, tasks: list[Task], workers: int, report: Report, where: str | None = None) -> None:
         """See `Engine.run`.
 
         Raises:
@@ -45,7 +45,7 @@ class Dask(Engine):
             futures = client.map(work, [folder] * len(tasks), [t.plain() for t in tasks], pure=False, batch_size=1000)
             for future in as_completed(futures):
                 try:
-                    told(future.result())
+                    report(future.result())
                 except KilledWorker:
                     continue  # left missing; the store counted how often it was begun
         except (CommClosedError, CancelledError) as error:

@@ -10,7 +10,7 @@ from tissuejax.campaign.child import Child
 from tissuejax.campaign.store import Store
 from tissuejax.campaign.task import Task
 
-Told = Callable[[dict[str, Any]], None]
+Report = Callable[[dict[str, Any]], None]
 
 
 class Engine(abc.ABC):
@@ -23,7 +23,7 @@ class Engine(abc.ABC):
     name: ClassVar[str]
 
     @abc.abstractmethod
-    def run(self, store: Store, tasks: list[Task], workers: int, told: Told, where: str | None = None) -> None:
+    def run(self, store: Store, tasks: list[Task], workers: int, report: Report, where: str | None = None) -> None:
         """Work through the tasks; `told` hears a short row of each. Cases that died with a worker are left missing.
 
         Args:
@@ -40,8 +40,8 @@ def work(folder: str, task: dict[str, Any]) -> dict[str, Any]:
     asked, store = Task.of(task), Store(Path(folder))
     if asked.limit <= 0 or threading.current_thread() is threading.main_thread():
         return store.work(asked)
-    told = CHILD.answer(folder, task, asked.limit)
-    return store.fail(asked, f"took longer than {asked.limit:g} s and did not stop") if told is None else told
+    answer = CHILD.answer(folder, task, asked.limit)
+    return store.fail(asked, f"took longer than {asked.limit:g} s and did not stop") if answer is None else answer
 
 
 CHILD = Child(work)

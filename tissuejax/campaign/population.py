@@ -162,9 +162,9 @@ def estimates(rows: Mapping[str, dict], groups: Mapping[str, str] | None = None)
     std = np.array([[r["parameters"][p]["std"] for p in paths] for r in used.values()])
     correlation = np.array([r["correlation"]["matrix"] for r in used.values()])
     covariance = correlation * std[:, :, None] * std[:, None, :]
-    told = tuple(groups[name] for name in used) if groups else ()
+    labels = tuple(groups[name] for name in used) if groups else ()
     units = tuple(next(iter(used.values()))["parameters"][p]["unit"] for p in paths)
-    return Estimates(tuple(used), paths, values, covariance, (values > 0).all(0), told, units)
+    return Estimates(tuple(used), paths, values, covariance, (values > 0).all(0), labels, units)
 
 
 def pooled(of: Estimates) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
@@ -192,16 +192,16 @@ def population(
     # one unit for all: parameters differ by orders of magnitude
     centre, size = x[seen].mean(0), np.maximum(x[seen].std(0, ddof=1), 1e-9)
     runner = runner or Runner(len(of.labels), draws, warmup, chains)
-    told = runner((x - centre) / size, S / np.outer(size, size), of.group, seen, seed)
+    drawn = runner((x - centre) / size, S / np.outer(size, size), of.group, seen, seed)
     scale = np.outer(size, size)
     return Population(
         of,
-        centre + size * told["m"],
-        scale * told["B"],
-        scale * told["A"],
-        size * told["a"],
-        told["divergences"],
-        told["rhat"],
+        centre + size * drawn["m"],
+        scale * drawn["B"],
+        scale * drawn["A"],
+        size * drawn["a"],
+        drawn["divergences"],
+        drawn["rhat"],
     )
 
 

@@ -5,7 +5,7 @@ from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from typing import ClassVar
 
-from tissuejax.campaign.engine import Engine, Told, work
+from tissuejax.campaign.engine import Engine, Report, work
 from tissuejax.campaign.store import Store
 from tissuejax.campaign.task import Task
 
@@ -17,16 +17,16 @@ class Processes(Engine):
 
     name: ClassVar[str] = "processes"
 
-    def run(self, store: Store, tasks: list[Task], workers: int, told: Told, where: str | None = None) -> None:
+    def run(self, store: Store, tasks: list[Task], workers: int, report: Report, where: str | None = None) -> None:
         """See `Engine.run`."""
         left = list(reversed(tasks))
         while left:
-            broken = self._pool(store, left, workers, told)
+            broken = self._pool(store, left, workers, report)
             if not broken:
                 return
             left = [task for task in left if store.row(task.key) is None and store.begun(task.key) <= RETRIES]
 
-    def _pool(self, store: Store, left: list[Task], workers: int, told: Told) -> bool:
+    def _pool(self, store: Store, left: list[Task], workers: int, report: Report) -> bool:
         """Work until `left` is empty or a worker dies; what was not finished is put back."""
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(workers, mp_context=context) as pool:
@@ -39,7 +39,7 @@ class Processes(Engine):
                     done, _ = wait(out, return_when=FIRST_COMPLETED)
                     for future in done:
                         task = out[future]
-                        told(future.result())
+                        report(future.result())
                         del out[future]
                 except BrokenProcessPool:
                     left.extend(out.values())

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from tissuejax.campaign.engine import Engine, Told
+from tissuejax.campaign.engine import Engine, Report
 from tissuejax.campaign.store import Store
 from tissuejax.campaign.task import Task
 
@@ -12,7 +12,7 @@ class Serial(Engine):
 
     name: ClassVar[str] = "serial"
 
-    def run(self, store: Store, tasks: list[Task], workers: int, told: Told, where: str | None = None) -> None:
+    def run(self, store: Store, tasks: list[Task], workers: int, report: Report, where: str | None = None) -> None:
         """See `Engine.run`."""
         for task in tasks:
-            told(store.work(task))
+            report(store.work(task))

@@ -65,10 +65,10 @@ def make(
             "--strong, --pairs, --rest are of probings; take --kind probing, or --kind rest for material tests"
         )
     which = {"strong": strong, "pairs": pairs} | ({"rest": True} if rest else {})
-    told = {} if commit is None else {"commit": commit}
+    pinned = {} if commit is None else {"commit": commit}
     if commit is not None:
         seed = seed_of(commit, kind, which)
-    plan = {"version": 1, "kind": kind, "count": count, "seed": seed} | which | told
+    plan = {"version": 1, "kind": kind, "count": count, "seed": seed} | which | pinned
     if (out / "manifest.json").exists():
         manifest = {"strong": False, "pairs": False} | files.read_manifest(out)
         if {k: manifest.get(k) for k in plan} == plan:

@@ -88,9 +88,9 @@ def read_causes(path: Path) -> tuple[list[Cause], dict[str, str]]:
     Raises:
         InputError: a sample twice, a cause without a group, or a null with one.
     """
-    told = tomllib.loads(Path(path).read_text())
+    file = tomllib.loads(Path(path).read_text())
     causes = []
-    for p in told["protocol"]:
+    for p in file["protocol"]:
         null, groups = bool(p.get("null")), tuple(frozenset(g) for g in p["expected"])
         if null == bool(groups):
             raise InputError(
@@ -99,7 +99,7 @@ def read_causes(path: Path) -> tuple[list[Cause], dict[str, str]]:
         causes += [Cause(s["id"], p["key"], null, groups, frozenset(p["beside"])) for s in p["specimens"]]
     if twice := [n for n, k in Counter(c.id for c in causes).items() if k > 1]:
         raise InputError(f"{path}: {', '.join(twice)} stands there more than once; give every sample a name of its own")
-    return causes, {other: word for word, others in told.get("names", {}).items() for other in others}
+    return causes, {other: word for word, others in file.get("names", {}).items() for other in others}
 
 
 def answered(cause: Cause, result: Mapping, words: Mapping[str, str] | None = None) -> Answer:

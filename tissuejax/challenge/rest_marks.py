@@ -56,8 +56,8 @@ class RestMark:
 
 def rest_size(result: dict) -> float:
     """Rms of the rest that a result states, Pa; nan where it states none."""
-    told = result.get("rest")
-    value = told.get("rms") if isinstance(told, dict) else None
+    rest = result.get("rest")
+    value = rest.get("rms") if isinstance(rest, dict) else None
     return float(value) if isinstance(value, int | float) else math.nan
 
 

@@ -86,14 +86,15 @@ Engines: serial, processes, dask (extra `cluster`). docs/cohort.md shows Slurm.
             begin(given.folder, given.files, settings, given.limit, given.retries)
         if given.action in ("run", "resume"):
             workers = positive(given.workers, "--workers")
-            told = go_on(given.folder, given.engine, workers, given.scheduler, given.failed, for_terminal())
+            counts = go_on(given.folder, given.engine, workers, given.scheduler, given.failed, for_terminal())
             return Reply(
-                told,
-                _text(told) + f"\n{told['ran']} done now in {told['seconds']:.1f} s, {told['per_second']:.2g} a second",
+                counts,
+                _text(counts)
+                + f"\n{counts['ran']} done now in {counts['seconds']:.1f} s, {counts['per_second']:.2g} a second",
             )
         if given.action == "status":
-            told = status(given.folder)
-            return Reply(told, _text(told))
+            counts = status(given.folder)
+            return Reply(counts, _text(counts))
         return _report(given.folder)
 
 
@@ -133,9 +134,9 @@ def _refuse_another(folder: Path, settings: Settings) -> None:
         )
 
 
-def _text(told: dict) -> str:
-    lines = [f"{told['cases']} cases: {told['done']} done, {told['failed']} failed, {told['missing']} missing"]
-    lines += [f"  ! {sample}: {reason}" for sample, reason in list(told["failures"].items())[:20]]
+def _text(counts: dict) -> str:
+    lines = [f"{counts['cases']} cases: {counts['done']} done, {counts['failed']} failed, {counts['missing']} missing"]
+    lines += [f"  ! {sample}: {reason}" for sample, reason in list(counts["failures"].items())[:20]]
     return "\n".join(lines)
 
 
@@ -149,8 +150,8 @@ def _report(folder: Path) -> Reply:
     writer.writeheader()
     writer.writerows(rows)
     files = {"table": write_text(folder / "cases.csv", text.getvalue())} | write_cohort(rows, status(folder), folder)
-    told = status(folder) | {"files": {n: str(p) for n, p in files.items()}}
-    return Reply(told, "\n".join([_text(told), *(str(p) for p in files.values())]))
+    counts = status(folder) | {"files": {n: str(p) for n, p in files.items()}}
+    return Reply(counts, "\n".join([_text(counts), *(str(p) for p in files.values())]))
 
 
 def _population(folder: Path, pattern: str | None) -> Reply:

@@ -104,11 +104,11 @@ misfit of several times the noise. With 3 and 4 what was found is written all th
         writer.writeheader()
         writer.writerows({"sample": name} | row for name, row in rows.items())
         table = write_text(out / "fits.csv", text.getvalue())
-        told = f"{codes.count(0)} of {len(rows)} samples converged to numbers that can be used"
-        told += f", {codes.count(SUSPECT)} are suspect (column suspect)" if SUSPECT in codes else ""
-        told += f", {codes.count(3)} did not converge" if 3 in codes else ""
+        outcome = f"{codes.count(0)} of {len(rows)} samples converged to numbers that can be used"
+        outcome += f", {codes.count(SUSPECT)} are suspect (column suspect)" if SUSPECT in codes else ""
+        outcome += f", {codes.count(3)} did not converge" if 3 in codes else ""
         code = 3 if 3 in codes else max(codes, default=0)
-        return Reply({"fits": rows, "table": str(table)}, f"{told}; table {table}", code)
+        return Reply({"fits": rows, "table": str(table)}, f"{outcome}; table {table}", code)
 
 
 def _named(model: Model) -> list[str]:

@@ -109,7 +109,7 @@ def _guessed(given: argparse.Namespace) -> Reply:
 
 
 def _said(guess: Guess, side: Path, given: argparse.Namespace) -> Reply:
-    told, table = shlex.quote(str(side)), shlex.quote(str(guess.path))
+    quoted, table = shlex.quote(str(side)), shlex.quote(str(guess.path))
     lines = [f"{guess.path}: {guess.machine or 'a table'}", *(f"  assumed: {s}" for s in guess.said)]
     record = {"side_file": str(side), "assumed": list(guess.said), "lacking": list(guess.lacking), "remarks": []}
     if guess.lacking:
@@ -131,7 +131,7 @@ def _said(guess: Guess, side: Path, given: argparse.Namespace) -> Reply:
     if given.out is not None and given.out.suffix in (".h5", ".hdf5"):
         record |= _written(str(side), given.out, given.force)
         lines.append(f"wrote {given.out}")
-    lines += [f"look   tissuejax inspect {told} --out look", f"fit    tissuejax fit {told} --energy neo-hookean"]
+    lines += [f"look   tissuejax inspect {quoted} --out look", f"fit    tissuejax fit {quoted} --energy neo-hookean"]
     return Reply(record, "\n".join(lines))
 
 
@@ -145,9 +145,9 @@ def _probed(given: argparse.Namespace) -> Reply:
     write(sample, out)
     found = remarks(sample)
     lines = [sample.notes.replace(". ", ".\n"), *(f"note: {remark}" for remark in found), f"wrote {out}"]
-    told = shlex.quote(str(out))
-    lines += [f"look   tissuejax inspect {told} --out look"]
-    lines += [f"fit    tissuejax fit {told} --energy reduced-polynomial-2 --volumetric quadratic"]
+    quoted = shlex.quote(str(out))
+    lines += [f"look   tissuejax inspect {quoted} --out look"]
+    lines += [f"fit    tissuejax fit {quoted} --energy reduced-polynomial-2 --volumetric quadratic"]
     written = {sample.name: {"file": str(out), "recordings": len(sample.recordings)}}
     return Reply({"written": written, "notes": sample.notes, "remarks": found}, "\n".join(lines))
 

@@ -72,9 +72,9 @@ def refuse_other(place: Path, mine: dict[str, Any]) -> None:
             raise InputError(f"{place}: holds {what}; name another folder with --out, or give --force to overwrite it")
 
 
-def _plain(told: dict[str, Any]) -> tuple[str, str, tuple[str, ...]]:
-    first, *rest = told["model"] or [""]
-    return told["verb"], told["sample"], (first, *sorted(rest)) if told["model"] else ()
+def _plain(record: dict[str, Any]) -> tuple[str, str, tuple[str, ...]]:
+    first, *rest = record["model"] or [""]
+    return record["verb"], record["sample"], (first, *sorted(rest)) if record["model"] else ()
 
 
 def _told(path: Path) -> tuple[str, str, tuple[str, ...]] | None:

@@ -67,19 +67,19 @@ Needs the extra `bayes`: pip install 'tissuejax[bayes]'.
         target, mode = target_of(found), np.array([found.values[p] for p in found.free])
         draws = positive(given.draws, "--draws")
         if given.sampler == "laplace":
-            told = laplace(target, mode, draws, given.seed)
+            draws_made = laplace(target, mode, draws, given.seed)
         else:
-            told = nuts(target, mode, draws, positive(given.chains, "--chains"), seed=given.seed)
-        record = {"made": made("posterior", sample.name, named)} | told.record()
+            draws_made = nuts(target, mode, draws, positive(given.chains, "--chains"), seed=given.seed)
+        record = {"made": made("posterior", sample.name, named)} | draws_made.record()
         if given.evidence:
             z = evidence(target, seed=given.seed)
             record["evidence"] = {"log_evidence": z.log_evidence, "std": z.std, "rungs": z.rungs}
         record["warnings"] = record["warnings"] + found.warnings
         files = {"result": write_json(out / "posterior.json", record)}
         with replacing(out / "posterior.nc") as temporary:
-            told.arviz().to_netcdf(str(temporary))
+            draws_made.arviz().to_netcdf(str(temporary))
         files["arviz"] = out / "posterior.nc"
-        files |= write_figures(Drawn(found, told), out)
+        files |= write_figures(Drawn(found, draws_made), out)
         units = {p: model.parameters[p].unit for p in found.free}
         lines = [f"{'parameter':<36}{'mean':>12}{'std':>12}  95 %"]
         for path, row in record["parameters"].items():

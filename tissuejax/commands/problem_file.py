@@ -116,9 +116,9 @@ def arguments(verb: str, problem: Mapping[str, object], path: Path) -> list[str]
     return made
 
 
-def _parameters(told: Mapping[str, Mapping[str, object]]) -> list[str]:
+def _parameters(parameters: Mapping[str, Mapping[str, object]]) -> list[str]:
     made = []
-    for path, one in told.items():
+    for path, one in parameters.items():
         for key, option in (("start", "--start"), ("fixed", "--fix")):
             if key in one:
                 made += [option, f"{path}={one[key]}"]

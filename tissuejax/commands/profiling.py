@@ -64,7 +64,7 @@ no parabola; where it does not close, the data do not bound the parameter on tha
             for path in paths:
                 profiles.append(profile(found, path, points=given.points))
                 stage.advance(note=path)
-        told = {
+        rows = {
             p.path: {
                 "value": found.values[p.path],
                 "unit": model.parameters[p.path].unit,
@@ -77,15 +77,15 @@ no parabola; where it does not close, the data do not bound the parameter on tha
         }
         mine = made("profile", sample.name, named)
         files = {
-            "result": write_json(out / "profiles.json", {"made": mine, "profiles": told, "warnings": found.warnings})
+            "result": write_json(out / "profiles.json", {"made": mine, "profiles": rows, "warnings": found.warnings})
         }
         files |= write_figures(Profiles(found, tuple(profiles)), out)
         lines = [f"{'parameter':<36}{'estimate':>12}  {'95 % by profile':<28}{'by standard error'}"]
-        for path, t in told.items():
+        for path, t in rows.items():
             ends, normal = (" to ".join(_end(e) for e in t[key]) for key in ("interval", "normal"))
             lines.append(f"{path:<36}{t['value']:>12.5g}  {ends:<28}{normal} {t['unit']}")
         lines += [f"  ! {w}" for w in found.warnings] + ["", *(str(p) for p in files.values())]
-        record = {"profiles": told, "warnings": found.warnings, "files": {n: str(p) for n, p in files.items()}}
+        record = {"profiles": rows, "warnings": found.warnings, "files": {n: str(p) for n, p in files.items()}}
         return Reply(record, "\n".join(lines), 0 if found.converged else 3)
 
 

@@ -113,10 +113,10 @@ def simulated(
     values = {p: v for p, v in values.items() if p in made.model.parameters or p in made.model.declared}
     missing = [p for p, d in made.model.parameters.items() if d.each and p not in values]
     predicted = made.predict(values)
-    told = as_measured(predicted, sample.recordings, noise, getattr(given, "seed", 0))
-    kept = Sample(sample.name, told, sample.geometry, sample.density, sample.gravity, f"predicted by {of.name}", "")
+    recorded = as_measured(predicted, sample.recordings, noise, getattr(given, "seed", 0))
+    kept = Sample(sample.name, recorded, sample.geometry, sample.density, sample.gravity, f"predicted by {of.name}", "")
     files = {"recording": write(kept, target)}
-    for name, recording in told.items():
+    for name, recording in recorded.items():
         paths = write_table(recording, out, sample.recordings[name] if measured else None)
         files |= {p.stem: p for p in paths}
     notes = assumed
@@ -129,7 +129,7 @@ def simulated(
         files |= _states(
             made, values, name, out, predicted[name], sample.recordings[name] if measured else None, given, notes
         )
-    peaks = {n: _peaks(r) for n, r in told.items()}
+    peaks = {n: _peaks(r) for n, r in recorded.items()}
     lines = [f"{n}: " + ", ".join(f"{c} to {v:.4g} {u}" for c, (v, u) in p.items()) for n, p in peaks.items()]
     lines += [f"  ! {note}" for note in notes] + [f"{k:<24}{p}" for k, p in files.items()]
     record = {"recordings": peaks, "notes": notes, "files": {k: str(p) for k, p in files.items()}}

@@ -136,8 +136,8 @@ class Entry:
         """Whether forms i and j are tried beside each other: next in the order, or one freeing all the other frees."""
         one, other = self.forms[i], self.forms[j]
         a, b = set(one.free), set(other.free)
-        told = one.name in other.beside or other.name in one.beside
-        return i != j and (abs(i - j) == 1 or a < b or b < a or told)
+        linked = one.name in other.beside or other.name in one.beside
+        return i != j and (abs(i - j) == 1 or a < b or b < a or linked)
 
 
 def settings(grid: Mapping[str, tuple[float, ...]], paths: Mapping[str, list[str]]) -> tuple[dict[str, float], ...]:

@@ -102,8 +102,8 @@ def _spread(bench: Bench, misfit: Misfit, r: Refit) -> tuple[tuple[str, ...], Fl
         return (), np.zeros((0, 0))
     fitted = misfit.whiten(bench.jacobian(r.values, paths, bench.fitted), bench.fitted)
     size = np.linalg.norm(fitted, axis=0)
-    told = size > 0  # of fibres that nothing stretches yet, all that is known is a prior
-    paths, fitted, size = tuple(np.array(paths, object)[told]), fitted[:, told], size[told]
+    moving = size > 0  # of fibres that nothing stretches yet, all that is known is a prior
+    paths, fitted, size = tuple(np.array(paths, object)[moving]), fitted[:, moving], size[moving]
     if not paths:
         return (), np.zeros((0, 0))
     _, s, v = np.linalg.svd(fitted / size, full_matrices=False)

@@ -152,8 +152,8 @@ class MaterialBench(Bench):
     @property
     def isotropic(self) -> bool:
         """Whether the base model, known physics included, knows no direction."""
-        told = {p.split(".")[1] for p in (*self.known, *self.base) if p.startswith("effects.")}
-        return self._energy.isotropic and all(e.effect.isotropic for e in self._entries if e.effect.name in told)
+        acting = {p.split(".")[1] for p in (*self.known, *self.base) if p.startswith("effects.")}
+        return self._energy.isotropic and all(e.effect.isotropic for e in self._entries if e.effect.name in acting)
 
     def elsewhere(self, values: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
         """Specimens cut along two axes allow several directions of the fibres; see `Bench.elsewhere`."""

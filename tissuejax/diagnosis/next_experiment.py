@@ -152,14 +152,14 @@ def proposals(
     )
     trial.known = bench.known
     names = [", ".join(dict.fromkeys(bench.candidates[k].name for k in r.keys)) for r in (chosen, rival)]
-    told = [trial.predict(shared(r)) for r in (chosen, rival)]
+    both = [trial.predict(shared(r)) for r in (chosen, rival)]
     old = [bench.jacobian(r.values, tuple(r.values), bench.fitted)[bench.mask(bench.fitted)] for r in (chosen, rival)]
     scale = bench.sigma[bench.mask(bench.fitted)][:, None]
     new = [_jacobian(trial, r) for r in (chosen, rival)]
     out = []
     for s in trial.segments:
         text = next(t for t, r in planned.items() if r.name == s.recording)
-        d = (told[0] - told[1])[s.rows] / sigma
+        d = (both[0] - both[1])[s.rows] / sigma
         if not np.all(np.isfinite(d)):
             continue
         sides = [against(d, o / scale, n[s.rows] / sigma) for o, n in zip(old, new, strict=True)]

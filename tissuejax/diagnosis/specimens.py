@@ -72,7 +72,7 @@ class Specimens:
         names = [r["effects"][0] for r in self.records.values() if r["effects"]]
         return dict(sorted({n: names.count(n) for n in names}.items(), key=lambda kv: -kv[1]))
 
-    def told(self) -> str:
+    def sentence(self) -> str:
         """One sentence: each specimen with its verdict."""
         words = {n: " + ".join(r["effects"] or r["best_attempt"]) or "nothing" for n, r in self.records.items()}
         return "; ".join(f"{n}: {r['verdict']}, {words[n]}" for n, r in self.records.items())

@@ -174,9 +174,9 @@ def _best(surfaces: Sequence[_Surface], orders: tuple[int, ...] = (1,)) -> _Foun
 
     Whether it is correlated is asked with the level free: a level that is a little off must not be read as a shape.
     """
-    told = [s(np.zeros(1), np.ones(1), s.walks(s.least, s.most, SHARES * TAUS), True) for s in surfaces]
-    white = _Found(0.0, 1.0, sum(float(t[0][0, 0]) for t in told), [math.sqrt(t[2][0, 0]) for t in told])
-    alone = [float(t[0][0, 0]) for t in told]
+    maps = [s(np.zeros(1), np.ones(1), s.walks(s.least, s.most, SHARES * TAUS), True) for s in surfaces]
+    white = _Found(0.0, 1.0, sum(float(t[0][0, 0]) for t in maps), [math.sqrt(t[2][0, 0]) for t in maps])
+    alone = [float(t[0][0, 0]) for t in maps]
     found = max((_correlated(surfaces, alone, True, order=k) for k in orders), key=lambda f: f.likelihood)
     if 2 * (found.likelihood - white.likelihood) <= GAIN:
         return replace(white, apart=found.apart)
@@ -207,16 +207,16 @@ def _correlated(
     best, apart = _Found(0.0, 1.0, -math.inf, []), None
     for _ in range(ROUNDS if near is None else ROUNDS - 1):
         shares = np.minimum(1 / (1 + np.exp(-logits)), 1 - NEVER_WHITE)
-        told = [s(shares, np.exp(logs), s.walks(*r), free, order) for s, r in zip(surfaces, ranges)]
-        total = sum(t[0] for t in told)
+        maps = [s(shares, np.exp(logs), s.walks(*r), free, order) for s, r in zip(surfaces, ranges)]
+        total = sum(t[0] for t in maps)
         i, j = np.unravel_index(np.argmax(total), total.shape)
         if apart is None:
-            own = sum(max(float(np.max(t[0])), w) for t, w in zip(told, white))
+            own = sum(max(float(np.max(t[0])), w) for t, w in zip(maps, white))
             apart = own - max(float(total[i, j]), sum(white))
         if total[i, j] > best.likelihood:
-            levels = [math.sqrt(t[2][i, j]) for t in told]
+            levels = [math.sqrt(t[2][i, j]) for t in maps]
             best = _Found(float(shares[i]), float(math.exp(logs[j])), float(total[i, j]), levels, apart, order)
-        ranges = [_narrowed(r, float(t[1][i, j])) for r, t in zip(ranges, told)]
+        ranges = [_narrowed(r, float(t[1][i, j])) for r, t in zip(ranges, maps)]
         logits = _around(logits, i)
         logs = _around(logs, j)
     return best

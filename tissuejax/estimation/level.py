@@ -138,8 +138,8 @@ def levels(responses: Sequence[Response]) -> list[Level]:
         unit = max(rough(r.values), 1e-3 * float(np.std(left))) or 1.0
         series.append(Series(r.time, left[:, None] / unit, kinks(r.time, r.drive)))
         taken.append((u, unit, float(np.std(left))))
-    told = estimate(series, recorded=False)
-    for i, noise, level, (u, unit, left) in zip(long, told.noises, told.levels, taken):
+    estimated = estimate(series, recorded=False)
+    for i, noise, level, (u, unit, left) in zip(long, estimated.noises, estimated.levels, taken):
         time = responses[i].time
         lost = float(np.sum((noise.covariance(time) @ u) * u)) / len(time)  # of the variance, in the description
         std = unit * level / math.sqrt(max(1 - lost, 0.25))

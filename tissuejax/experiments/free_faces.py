@@ -108,10 +108,10 @@ def _along(residual: Callable[[Array, Array], Array], drive: Float[Array, " n"])
 
     @roots.defjvp
     def implicit(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
-        (near, *told), (_, *moved) = primals, tangents
-        y = roots(near, *told)
-        _, moving = jax.jvp(lambda *told: fixed(y, *told), tuple(told), tuple(moved))
-        _, slope = jax.jvp(lambda x: fixed(x, *told), (y,), (jnp.ones_like(y),))
+        (near, *others), (_, *moved) = primals, tangents
+        y = roots(near, *others)
+        _, moving = jax.jvp(lambda *others: fixed(y, *others), tuple(others), tuple(moved))
+        _, slope = jax.jvp(lambda x: fixed(x, *others), (y,), (jnp.ones_like(y),))
         return y, -moving / slope
 
     return roots(near, drive, *held)

@@ -69,8 +69,10 @@ def _numerics(found: "Fit") -> list[str]:
 def numerics_sentence(found: "Fit") -> str:
     """One line on the numerical checks of a fit's simulations, the worst recording of each; empty without any."""
     shares = {c: max((v[c] for v in found.numerics.values() if c in v), default=None) for c in CHECKS}
-    told = ", ".join(f"{check} {share:.2%}" for check, share in shares.items() if share is not None)
-    return f"Simulations at worst: {told} (of strain energy, of the probe's radius, of strain energy)." if told else ""
+    worst = ", ".join(f"{check} {share:.2%}" for check, share in shares.items() if share is not None)
+    return (
+        f"Simulations at worst: {worst} (of strain energy, of the probe's radius, of strain energy)." if worst else ""
+    )
 
 
 def beyond_noise(found: "Fit") -> dict[str, float]:

@@ -28,7 +28,7 @@ BELOW = 0.1  # nor is one shorter than this share of what mesh, step and penalty
 Derive = Callable[[Float[np.ndarray, " p"]], Float[np.ndarray, "n p"]]
 
 
-class Told:
+class Simulated:
     """Predictions made so far, so that nothing is simulated twice."""
 
     def __init__(self):
@@ -81,7 +81,9 @@ class Changes(NamedTuple):
     left: dict[str, Float[np.ndarray, " n"]]
 
 
-def changes(problem: Problem, values: Mapping[str, float], told: Told, finer: bool, numerical: bool) -> Changes:
+def changes(
+    problem: Problem, values: Mapping[str, float], simulated: Simulated, finer: bool, numerical: bool
+) -> Changes:
     """Pace, mesh and penalty changed one at a time, in one batch; the last two in runs twice as fast.
 
     Args:
@@ -99,7 +101,7 @@ def changes(problem: Problem, values: Mapping[str, float], told: Told, finer: bo
     if numerical:
         wanted["penalty"] = fast.changed(penalty=2 * fast.penalty)
     order = sorted(wanted, key=lambda name: name != "mesh")  # the longest run first
-    predicted = told.all([problem.predictor.with_settings(wanted[name]) for name in order], values)
+    predicted = simulated.all([problem.predictor.with_settings(wanted[name]) for name in order], values)
     r = {name: problem.misfit(p, values) for name, p in zip(order, predicted, strict=True)}
     left = {}
     if numerical:
@@ -113,7 +115,7 @@ def close(
     x: Float[np.ndarray, " p"],
     jacobian: Float[np.ndarray, "n p"],
     seen: Changes,
-    told: Told,
+    simulated: Simulated,
     finer: bool,
     holdout: tuple[str, ...] = (),
     derive: Derive | None = None,
@@ -150,7 +152,7 @@ def close(
         step = np.linalg.lstsq(jacobian, at.residuals, rcond=None)[0]
         trial = np.clip(at.x - step, lower, upper)
         values = final.values(trial)
-        r = final.misfit(told.all([final.predictor, *companions], values)[0], values)
+        r = final.misfit(simulated.all([final.predictor, *companions], values)[0], values)
         at = Closing(final, trial, r, reach(jacobian, r))
         worse = best is not None and r @ r >= best.residuals @ best.residuals
         best = best if worse else at

@@ -149,8 +149,8 @@ def nuts_runner(target: Target, draws: int, chains: int, warmup: int):
             state, info = kernel.step(key, state)
             return state, (state.position, info.is_divergent)
 
-        _, told = jax.lax.scan(step, state, jax.random.split(third, draws))
-        return told
+        _, drawn = jax.lax.scan(step, state, jax.random.split(third, draws))
+        return drawn
 
     @jax.jit
     def run(centre, root, data, key):

@@ -21,7 +21,7 @@ from tissuejax.errors import InputError
 from tissuejax.experiments.probing_predictor import ProbingPredictor, make_ready
 from tissuejax.fitting.advice import warnings_of
 from tissuejax.fitting.bands import fitted_std
-from tissuejax.fitting.closing import Told, changes, close
+from tissuejax.fitting.closing import Simulated, changes, close
 from tissuejax.fitting.closing import shifts as numerical_shifts
 from tissuejax.fitting.levenberg_marquardt import Descent
 from tissuejax.fitting.problem import Problem
@@ -123,16 +123,16 @@ def fit_probed(
         J = unchained(J, slope)
         kept.keep(problem.values(x), closing=True)
         stage.advance(note="numerical error" if numerical else "the fine simulation")
-        seen = changes(problem, problem.values(x), runs.told, finish, numerical)
+        seen = changes(problem, problem.values(x), runs.simulated, finish, numerical)
         shifts, sizes = numerical_shifts(problem, seen.left, J)
         stage.advance(note="finer mesh" if finish else "last steps")
-        problem, x, r, left = close(problem, x, J, seen, runs.told, finish, holdout, runs.better, runs.closer)
+        problem, x, r, left = close(problem, x, J, seen, runs.simulated, finish, holdout, runs.better, runs.closer)
         cost = 0.5 * float(r @ r)
         final, values = problem.predictor, problem.values(x)
         before, after = kept.before, vector_errors(problem, r)
-        fitted = dict(runs.told.all([final], values)[0])
+        fitted = dict(runs.simulated.all([final], values)[0])
         stage.advance(note="held out")
-        held = dict(runs.told.all([final.of(holdout)], values)[0]) if holdout else {}
+        held = dict(runs.simulated.all([final.of(holdout)], values)[0]) if holdout else {}
     status = "the last steps are still long" if left >= LAST else "converged" if descent.converged else descent.reason
     noise_part = _noise_part(problem, x, J, r)
     spread = _with_shifts(noise_part, [np.array(list(s.values())) for s in shifts.values()])
@@ -157,7 +157,7 @@ def fit_probed(
         ],
         stability=recorded_stability(final, values),
         starts=[2 * cost],
-        n_evaluations=runs.told.runs + runs.jacobians,
+        n_evaluations=runs.simulated.runs + runs.jacobians,
         seconds=time.perf_counter() - begun,
         method=METHOD,
         sites={
@@ -171,7 +171,7 @@ def fit_probed(
         found.warnings.append(_numerical_sentence(problem.free, shifts, noise_part))
     kept.done()
     noise_std = dict(zip(problem.free, map(float, noise_part.std), strict=True))
-    return ProbedFit(found, shifts, sizes, noise_std, {"forward": runs.told.runs, "jacobian": runs.jacobians})
+    return ProbedFit(found, shifts, sizes, noise_std, {"forward": runs.simulated.runs, "jacobian": runs.jacobians})
 
 
 class Runs:
@@ -188,7 +188,7 @@ class Runs:
         fine = problem.predictor
         self.swift = replace(problem, predictor=fine.with_settings(fine.settings.swift))
         self.coarse = replace(problem, predictor=fine.with_settings(fine.settings.coarse))
-        self.told, self.jacobians, self.first = Told(), 0, {}
+        self.simulated, self.jacobians, self.first = Simulated(), 0, {}
 
     def begin(self, y: Float[np.ndarray, " p"]) -> Float[np.ndarray, " n"]:
         """Residuals at the start, which come with the derivatives there and are kept with them."""
@@ -204,7 +204,7 @@ class Runs:
         if y.tobytes() in self.first:
             return self.first[y.tobytes()][0]
         self.stage.advance(note="simulation")
-        return self.told.residuals(self.swift, self.problem.values(self.problem.box.bounded(y)[0]))
+        return self.simulated.residuals(self.swift, self.problem.values(self.problem.box.bounded(y)[0]))
 
     def jacobian(self, y: Float[np.ndarray, " p"]) -> Float[np.ndarray, "n p"]:
         """Of the swift simulation, to y."""
@@ -224,7 +224,7 @@ class Runs:
 
     def closer(self, x: Float[np.ndarray, " p"], cost: float) -> None:
         """The same for a chord step of the end."""
-        self._told(self.told.runs + self.jacobians, cost, self.problem.values(x), closing=True)
+        self._told(self.simulated.runs + self.jacobians, cost, self.problem.values(x), closing=True)
 
     def _told(self, n: int, cost: float, values: dict[str, float], closing: bool) -> None:
         self.kept.keep(values, closing)

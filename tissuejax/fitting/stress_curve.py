@@ -63,7 +63,7 @@ def fit_stress_curve(posed: Problem, *, holdout: tuple[str, ...] = (), iteration
     for other in holdout:
         for channel, series in measured[other].channels.items():
             std[f"{other}/{channel}"] = series.noise_std or std.get(f"{name}/{channel}", 1.0)
-    told = scores(measured, fitted, std)
+    marks = scores(measured, fitted, std)
     p = len(posed.free)
     unknown = np.full((p, p), np.nan)
     runs = [t.force_rmse for t in turns]
@@ -78,8 +78,8 @@ def fit_stress_curve(posed: Problem, *, holdout: tuple[str, ...] = (), iteration
         values=values,
         uncertainty=Uncertainty(np.full(p, np.inf), unknown, unknown, np.inf, (said,)),
         at_bound={},
-        chi2=sum(s.chi2_per_sample * s.n for s in told.values()),
-        channels=told,
+        chi2=sum(s.chi2_per_sample * s.n for s in marks.values()),
+        channels=marks,
         holdout=scores(measured, held, std),
         predictions=dict(fitted) | held,
         trace=[Iterate(i, (t.force_rmse / std[f"{name}/force"]) ** 2, t.values) for i, t in enumerate(turns, 1)],

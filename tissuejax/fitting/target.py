@@ -72,9 +72,9 @@ class Target:
         """-chi-square / 2, priors included; constants are left out."""
         problem = self.problem
         values = {p: jnp.asarray(float(v)) for p, v in problem.start.items()} | dict(zip(problem.free, x))
-        told = problem.predictor.predict(values)
+        recordings = problem.predictor.predict(values)
         predicted = jnp.concatenate(
-            [jnp.ravel(told[r].channels[c].values)[problem.seen[r, c]] for r, c in problem.channels]
+            [jnp.ravel(recordings[r].channels[c].values)[problem.seen[r, c]] for r, c in problem.channels]
         )
         chi2 = jnp.sum(((predicted - data) / self._sigma) ** 2)
         for path, (mean, std) in problem.priors.items():

@@ -59,28 +59,28 @@ def probing_sample(path: Path) -> Sample:
         InputError: the file and key, what was found, what was expected.
     """
     try:
-        told = tomllib.loads(path.read_text("utf-8-sig"))
+        side = tomllib.loads(path.read_text("utf-8-sig"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: found text that is not TOML ({error}), expected a probing side file") from error
     try:
-        return _sample(told, path)
+        return _sample(side, path)
     except InputError as error:
         raise error if str(error).startswith(str(path)) else InputError(f"{path}: {error}") from error
 
 
-def _sample(told: Mapping[str, object], path: Path) -> Sample:
-    for key in told:
+def _sample(side: Mapping[str, object], path: Path) -> Sample:
+    for key in side:
         if key not in WHOLE:
             raise unknown("key", key, WHOLE)
-    if not isinstance(told.get("body"), dict):
+    if not isinstance(side.get("body"), dict):
         raise InputError('body: found nothing, expected [body] with surface, cloud, mesh or slab, e.g. slab = "20 mm"')
-    parts = told.get("probing")
+    parts = side.get("probing")
     if not isinstance(parts, list) or not parts:
         raise InputError("probing: found nothing, expected one [[probing]] for each recording")
-    made, notes, lift = body(told["body"], path)
+    made, notes, lift = body(side["body"], path)
     rigid = None
-    if "registration" in told:
-        rigid = _rigid(told["registration"])
+    if "registration" in side:
+        rigid = _rigid(side["registration"])
         off = 1e3 * float(np.nanmax(rigid.residuals))
         notes.append(f"Registration by {len(rigid.residuals)} points, the worst {off:.2f} mm off.")
     recordings: dict[str, Recording] = {}
@@ -89,15 +89,15 @@ def _sample(told: Mapping[str, object], path: Path) -> Sample:
             if recording.name in recordings:
                 raise InputError(f"probing: two recordings are called {recording.name!r}; give each its own name")
             recordings[recording.name] = recording
-    density = told.get("density")
+    density = side.get("density")
     return Sample(
-        str(told.get("sample", path.stem)),
+        str(side.get("sample", path.stem)),
         recordings,
         made,
         None if density is None else quantity(density, "kg/m^3", "density"),
-        _gravity(told.get("gravity")),
-        str(told.get("source", "")),
-        " ".join([*([str(told["notes"])] if "notes" in told else []), *notes]),
+        _gravity(side.get("gravity")),
+        str(side.get("source", "")),
+        " ".join([*([str(side["notes"])] if "notes" in side else []), *notes]),
     )
 
 

@@ -51,6 +51,6 @@ class DirectSession(Session):
     def rest(self) -> None:
         self.direct.rest()
 
-    def told(self) -> str:
+    def remark(self) -> str:
         late = f"; {self.behind:.1f} s of life were left out" if self.behind > 0.5 else ""
         return f"full model, {self.pace.times_life:.1f} times life{late}"

@@ -30,8 +30,8 @@ def cursor(message: dict) -> tuple[str, np.ndarray] | None:
 
 def command(device: str, force: Sequence[float]) -> dict:
     """The message that sets a force, N."""
-    told = {"vector": {a: float(f) for a, f in zip("xyz", force)}}
-    return {"inverse3": [{"device_id": device, "commands": {"set_cursor_force": told}}]}
+    newtons = {"vector": {a: float(f) for a, f in zip("xyz", force)}}
+    return {"inverse3": [{"device_id": device, "commands": {"set_cursor_force": newtons}}]}
 
 
 async def follow(asker, guard: Guard, centre: np.ndarray, seconds: float, address: str = ADDRESS) -> dict:

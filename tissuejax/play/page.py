@@ -16,8 +16,8 @@ def served() -> str:
 
 def alone(model: dict) -> str:
     """The page with the model inside: it needs no server and no network."""
-    told = json.dumps(plain(model)).replace("</", "<\\/")
-    return served().replace(SLOT, told)
+    payload = json.dumps(plain(model)).replace("</", "<\\/")
+    return served().replace(SLOT, payload)
 
 
 def export(model: dict, path: str | Path) -> Path:

@@ -17,12 +17,12 @@ def errors(measured: Recording, simulated: Recording) -> dict[str, dict]:
     """Root mean square of the residuals by channel, and over the noise where that is recorded; peak of the force."""
     found = {}
     for name, channel in simulated.channels.items():
-        told = measured.channels[name]
-        apart = np.asarray(channel.values, float) - np.asarray(told.values, float)
+        truth = measured.channels[name]
+        apart = np.asarray(channel.values, float) - np.asarray(truth.values, float)
         rms = float(np.sqrt(np.nanmean(apart**2)))
-        found[name] = {"rms": rms, "unit": told.unit}
-        if told.noise_std:
-            found[name]["over_noise"] = rms / told.noise_std
+        found[name] = {"rms": rms, "unit": truth.unit}
+        if truth.noise_std:
+            found[name]["over_noise"] = rms / truth.noise_std
     if "force" in found:
         found["force"]["peak"] = float(np.nanmax(np.linalg.norm(np.asarray(measured.channels["force"].values), axis=1)))
     return found
@@ -58,7 +58,7 @@ def for_page(surrogate: Surrogate, measured: Recording, lobe: Lobe | None, most:
         return np.stack([np.interp(clock, time, column) for column in flat.T], 1)
 
     offset = np.asarray(surrogate.rig.offset)
-    told = {
+    words = {
         "name": measured.name, "duration": end - begin, "frames": most, "time": coded(clock),
         "path": coded(along(measured.inputs["probe/time"], measured.inputs["probe/position"]) + offset),
         "measured": coded(along(force.time, force.values)),
@@ -68,12 +68,12 @@ def for_page(surrogate: Surrogate, measured: Recording, lobe: Lobe | None, most:
     }  # fmt: skip
     if "markers" in ours.channels:
         a, b = measured.channels["markers"], ours.channels["markers"]
-        told |= {
+        words |= {
             "points": a.values.shape[1],
             "markers": coded(along(a.time, a.values)),
             "simulated": coded(along(b.time, b.values)),
         }
-    return told
+    return words
 
 
 def _shown(error: dict) -> str:

@@ -92,7 +92,7 @@ class Server:
         self.pages.pop(connection, None)
 
     async def _tick(self) -> None:
-        last, number, told = time.monotonic(), 0, 0.0
+        last, number, said = time.monotonic(), 0, 0.0
         while True:
             await asyncio.sleep(max(0.0, last + 1 / RATE - time.monotonic()))
             now = time.monotonic()
@@ -102,8 +102,8 @@ class Server:
                 self.session.error = str(fault)
             last, number = now, number + 1
             frame = self.session.frame(number)
-            words = {"told": self.session.told()} if now > told + 1 else {}
-            told = now if words else told
+            words = {"told": self.session.remark()} if now > said + 1 else {}
+            said = now if words else said
             if self.session.error:
                 words["error"], self.session.error = self.session.error, None
             for state in self.pages.values():  # a slow page hears what was said while it drew

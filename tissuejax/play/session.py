@@ -37,7 +37,7 @@ class Session(abc.ABC):
     def body(self) -> Float[np.ndarray, " n"]:
         """What a frame carries beside place and force."""
 
-    def told(self) -> str:
+    def remark(self) -> str:
         """A word on pace, shown in the page."""
         return ""
 
@@ -82,7 +82,7 @@ class SurrogateSession(Session):
     def rest(self) -> None:
         self.asker.rest()
 
-    def told(self) -> str:
+    def remark(self) -> str:
         return f"computed by the server, {1e6 * self.spent / max(self.count, 1):.0f} us a force"
 
 

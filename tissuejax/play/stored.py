@@ -86,5 +86,5 @@ class RunSession(Session):
     def body(self) -> np.ndarray:
         return self.run.shape(self.clock)
 
-    def told(self) -> str:
+    def remark(self) -> str:
         return f"stored run at {self.clock:.2f} s"

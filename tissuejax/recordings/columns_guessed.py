@@ -68,8 +68,8 @@ def _one(name: str, unit: str, values: np.ndarray, meanings: Mapping[str, str], 
     base = split_unit(name)[0]
     label = ""
     text = re.sub(r" \d+$", "", bare(base)) if name.endswith(")") and not unit else bare(base)
-    told = meanings.get(text)
-    quantity = told if told is not None else quantity_of(base, unit)
+    meaning = meanings.get(text)
+    quantity = meaning if meaning is not None else quantity_of(base, unit)
     if quantity is None:
         words = text.split()
         for k in range(1, len(words)):

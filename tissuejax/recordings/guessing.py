@@ -122,8 +122,8 @@ def guessed(
         said.append(f"the time column {time.column!r} {fault}")
     used = [g for pair, _ in pairs for g in pair] + ([time] if time and not fault else [])
     said += list(dict.fromkeys(g.assumed for g in used if g.assumed))
-    signs, positive, told = _signs(pairs, numbers, experiment, positive, bool(_PRESSED.search(words)))
-    said += told
+    signs, positive, remarks = _signs(pairs, numbers, experiment, positive, bool(_PRESSED.search(words)))
+    said += remarks
     zeros = _zeros(pairs, numbers, experiment, said)
     specimen = _needed(pairs, experiment, known)
     empty = ~np.all([np.isfinite(numbers[g.column]) for g in used], axis=0)

@@ -72,9 +72,9 @@ def refuse_unusable(sample: Sample, names: Iterable[str]) -> None:
                     f"recording {name}: neither the deformation nor {key} ever changes: there is nothing to fit; "
                     "check the columns that were read"
                 )
-    told = {n: c.noise_std for n in names for k, c in sample.recordings[n].channels.items() if k != "markers"}
-    zero = [n for n, s in told.items() if s == 0]
-    if zero and any(s for s in told.values()):
+    stds = {n: c.noise_std for n in names for k, c in sample.recordings[n].channels.items() if k != "markers"}
+    zero = [n for n, s in stds.items() if s == 0]
+    if zero and any(s for s in stds.values()):
         raise InputError(
             f"recording {zero[0]}: noise_std is 0 while other recordings have noise: it would weigh infinitely; give "
             "its noise level, leave it out of the file, or fit with --weights uniform"

@@ -74,8 +74,8 @@ def side_text(guess: Guess, file: str) -> str:
     if guess.specimen:
         lines += ["", "[specimen]"]
         for size, value in guess.specimen.items():
-            told = "FILL IN: " if value == "?" else ""
-            lines.append(_commented(f"{size} = {json.dumps(value)}", told + _SIZES.get(size, "")))
+            mark = "FILL IN: " if value == "?" else ""
+            lines.append(_commented(f"{size} = {json.dumps(value)}", mark + _SIZES.get(size, "")))
     lines += ["", "[noise]", *_noise(guess)]
     if len(guess.pairs) > 1:
         for pair, label in guess.pairs:

@@ -76,10 +76,10 @@ def recording_from(
     abscissa = time if timed else _path(motion)
     noise = _noise(part, load, columns, rows, per_unit, abscissa, stress)
     key = "shear" if part.experiment == "simple-shear" else "stretch"
-    told = part.noise.get(kinematic)
-    if told is not None and told != "estimate":
+    stated = part.noise.get(kinematic)
+    if stated is not None and stated != "estimate":
         slope = _slope(values[kinematic], motion, kinematic, sizes)
-        attributes[f"{key}/noise_std"] = _said(told, kinematic, columns, rows) * slope
+        attributes[f"{key}/noise_std"] = _said(stated, kinematic, columns, rows) * slope
     channel = Channel(time, stress, "Pa", noise)
     return Recording(name, part.experiment, {"time": time, key: motion}, {"nominal_stress": channel}, attributes), notes
 
@@ -149,17 +149,17 @@ def selected(part: Part, values: Mapping[str, np.ndarray], kinematic: str, load:
     Raises:
         InputError: nothing left, a cycle that isn't there, a preload that is never reached.
     """
-    told = part.selection
-    mask, notes = chosen(told, values[kinematic], values[load], place)
+    rule = part.selection
+    mask, notes = chosen(rule, values[kinematic], values[load], place)
     rows = np.flatnonzero(mask)
-    if not told.preload and told.toe is None:
+    if not rule.preload and rule.toe is None:
         return Kept(rows, {q: v[rows] for q, v in values.items()}, sizes, notes)
     if values[kinematic].ndim != 1:
         raise checks.refusal(place, "preload, toe", "a biaxial test", "a test with one load: cut the rows by `where`")
     si = QUANTITIES[load]
-    preload = quantity(told.preload, si, "preload") if told.preload else None
-    toe = tuple(quantity(t, si, "toe") for t in told.toe) if told.toe else None
-    first, zero, said = start_of(told, values[kinematic][rows], values[load][rows], preload, toe, place)
+    preload = quantity(rule.preload, si, "preload") if rule.preload else None
+    toe = tuple(quantity(t, si, "toe") for t in rule.toe) if rule.toe else None
+    first, zero, said = start_of(rule, values[kinematic][rows], values[load][rows], preload, toe, place)
     rows = rows[first:]
     if len(rows) < 2:
         raise checks.refusal(place, "preload, toe", f"{len(rows)} row(s) left", "at least 2")
@@ -282,13 +282,13 @@ def _path(motion: np.ndarray) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(np.maximum(steps, 1e-12))])
 
 
-def _said(told: str | Column, quantity_name: str, columns: Columns, rows: np.ndarray) -> float:
+def _said(stated: str | Column, quantity_name: str, columns: Columns, rows: np.ndarray) -> float:
     """A noise level as the side file gives it, SI; the quadratic mean of a column."""
     si = QUANTITIES[quantity_name]
-    if isinstance(told, Column):
-        values = columns.numbers(told.column)[rows] * factor(told.unit, si)
+    if isinstance(stated, Column):
+        values = columns.numbers(stated.column)[rows] * factor(stated.unit, si)
         return float(np.sqrt(np.nanmean(values**2)))
-    return quantity(told, si)
+    return quantity(stated, si)
 
 
 def _noise(
@@ -339,9 +339,9 @@ def _probing(
     position[:, 2] = sizes.get("height", 0.0) + radius - values["displacement"]
     force = np.zeros((len(time), 3))
     force[:, 2] = values["force"]
-    told = part.noise.get("force", "estimate")
+    stated = part.noise.get("force", "estimate")
     estimate = max(convert.noise_estimate(time, values["force"]), 1e-6 * float(np.abs(values["force"]).max()))
-    noise = estimate if told == "estimate" else quantity(told, "N")
+    noise = estimate if stated == "estimate" else quantity(stated, "N")
     inputs = {"probe/time": time, "probe/position": position}
     channel = Channel(time, force, "N", noise)
     return Recording(name, "probing", inputs, {"force": channel}, attributes | {"probe/radius": radius})

@@ -126,13 +126,14 @@ def _parsed(path: Path, changed: int) -> SideFile:
 
 @functools.lru_cache(maxsize=8)
 def _loaded(path: Path, changed: int, reading: tuple) -> Columns:
-    told = dict(reading)
-    kind = told.pop("format", None)
+    options = dict(reading)
+    kind = options.pop("format", None)
     if kind is None:
-        return load(path, **told)
-    if told:
+        return load(path, **options)
+    if options:
         raise InputError(
-            f"{path}: format = {kind!r} says how the file is laid out: leave {', '.join(told)} out, or leave format out"
+            f"{path}: format = {kind!r} says how the file is laid out: "
+            f"leave {', '.join(options)} out, or leave format out"
         )
     return export_named(kind).read(path).columns
 

@@ -20,7 +20,7 @@ DENSE = 1500
 
 
 @dataclass(frozen=True)
-class Told:
+class Curve:
     """One series, SI.
 
     Attributes:
@@ -57,7 +57,7 @@ class DiagnosisCurves(Plot):
     subject: ClassVar[type] = Diagnosis
     order: ClassVar[int] = 5
 
-    def prepare(self, subject: Diagnosis) -> list[Told]:
+    def prepare(self, subject: Diagnosis) -> list[Curve]:
         """The series that the base misses most, held-out ones always among them, and the marker that it misses most."""
         bench, base, chosen = subject.search.bench, subject.search.empty, subject.verdict.chosen
         half = _half(subject)
@@ -73,7 +73,7 @@ class DiagnosisCurves(Plot):
         names = (*bench.fitted, *bench.held_out)
         shown = fitted[: MOST - len(held) - len(marks)] + held + marks
         return [
-            Told(
+            Curve(
                 f"{s.recording}{' (held out)' if s.recording in bench.held_out else ''}",
                 s.label.replace("_", " "),
                 s.time,
@@ -90,7 +90,7 @@ class DiagnosisCurves(Plot):
             for s in sorted(shown, key=lambda s: (names.index(s.recording), s.label))
         ]
 
-    def caption(self, data: list[Told]) -> str:
+    def caption(self, data: list[Curve]) -> str:
         """What the lines are, and how many of the held-out values the band holds."""
         effects = any(t.improved is not None for t in data)
         text = "Measured (points), the base model (dashed)" + (" and with the effects named (line)" if effects else "")
@@ -102,39 +102,39 @@ class DiagnosisCurves(Plot):
             text += f"; it holds {np.mean(inside):.0%} of those held out"
         return text + "."
 
-    def draw(self, data: list[Told]) -> Figure:
+    def draw(self, data: list[Curve]) -> Figure:
         """A row a series: left over what was done, right over time."""
         figure, axes = grid(2 * len(data), columns=2, height=2.5)
-        for i, told in enumerate(data):
-            if told.swept:
-                _draw(axes[2 * i], told, by_time=False)
+        for i, curve in enumerate(data):
+            if curve.swept:
+                _draw(axes[2 * i], curve, by_time=False)
             else:
                 axes[2 * i].set_visible(False)
-            _draw(axes[2 * i + 1], told, by_time=True)
+            _draw(axes[2 * i + 1], curve, by_time=True)
         legend_below(figure, axes)
         return figure
 
 
-def _draw(ax, told: Told, by_time: bool) -> None:
-    factor, unit = display(told.unit, float(np.nanmax(np.abs(told.measured), initial=0.0)))
-    thin = slice(None, None, max(1, len(told.time) // DENSE))
-    scale, drive_unit = display(told.drive_unit, float(np.nanmax(np.abs(told.drive), initial=0.0)))
-    x = (told.time if by_time else told.drive / scale)[thin]
-    colour, kind = (HELD, ", held out") if told.held else (MODEL, "")
-    best = told.base if told.improved is None else told.improved
-    scatter(ax, x, told.measured[thin] / factor)
+def _draw(ax, curve: Curve, by_time: bool) -> None:
+    factor, unit = display(curve.unit, float(np.nanmax(np.abs(curve.measured), initial=0.0)))
+    thin = slice(None, None, max(1, len(curve.time) // DENSE))
+    scale, drive_unit = display(curve.drive_unit, float(np.nanmax(np.abs(curve.drive), initial=0.0)))
+    x = (curve.time if by_time else curve.drive / scale)[thin]
+    colour, kind = (HELD, ", held out") if curve.held else (MODEL, "")
+    best = curve.base if curve.improved is None else curve.improved
+    scatter(ax, x, curve.measured[thin] / factor)
     if by_time:
-        low, high = ((best + side * told.half)[thin] / factor for side in (-1, 1))
+        low, high = ((best + side * curve.half)[thin] / factor for side in (-1, 1))
         ax.fill_between(x, low, high, color=colour, alpha=0.22, linewidth=0, label=f"95 % band{kind}", zorder=1)
     line = {"linewidth": 1.3, "zorder": 4}
-    if told.improved is None:
-        ax.plot(x, told.base[thin] / factor, color=colour, label=f"base model{kind}", **line)
+    if curve.improved is None:
+        ax.plot(x, curve.base[thin] / factor, color=colour, label=f"base model{kind}", **line)
     else:
-        ax.plot(x, told.base[thin] / factor, color=BASE, linestyle=(0, (4, 2)), label="base model", **line)
-        ax.plot(x, told.improved[thin] / factor, color=colour, label=f"with effects{kind}", **line)
-    ax.set_title(told.title, loc="left", fontsize=9.5, color=INK)
-    ax.set_xlabel("time (s)" if by_time else f"{told.drive_name}{label(drive_unit)}")
-    ax.set_ylabel(f"{told.channel}{label(unit)}")
+        ax.plot(x, curve.base[thin] / factor, color=BASE, linestyle=(0, (4, 2)), label="base model", **line)
+        ax.plot(x, curve.improved[thin] / factor, color=colour, label=f"with effects{kind}", **line)
+    ax.set_title(curve.title, loc="left", fontsize=9.5, color=INK)
+    ax.set_xlabel("time (s)" if by_time else f"{curve.drive_name}{label(drive_unit)}")
+    ax.set_ylabel(f"{curve.channel}{label(unit)}")
 
 
 def _carries(bench, s: Segment) -> bool:

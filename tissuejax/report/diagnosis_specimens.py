@@ -26,11 +26,11 @@ class DiagnosisSpecimens(Plot):
         names, effects = list(subject.records), list(subject.counts)
         if not names:
             return None
-        told = {n: r["effects"] or attempted(r) for n, r in subject.records.items()}
-        effects += [e for e in dict.fromkeys(e for t in told.values() for e in t) if e not in effects]
+        effects_of = {n: r["effects"] or attempted(r) for n, r in subject.records.items()}
+        effects += [e for e in dict.fromkeys(e for t in effects_of.values() for e in t) if e not in effects]
         rank = np.full((len(names), max(len(effects), 1)), np.nan)
         for i, name in enumerate(names):
-            for order, effect in enumerate(told[name]):
+            for order, effect in enumerate(effects_of[name]):
                 rank[i, effects.index(effect)] = order
         errors = [subject.records[n]["rmse_over_peak"] for n in names]
         return {

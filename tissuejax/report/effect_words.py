@@ -43,15 +43,15 @@ def said(name: str, found: Mapping[str, Found]) -> str:
         found: by parameter, without "effects.NAME.".
     """
     kind = effects().get(name)
-    told = []
+    spoken = []
     for clause in kind.words if kind else ():
         names = [m[1] for m in _FIELD.finditer(clause)]
         if not all(n in found for n in names):
             continue
         leading = [n for n in names if found[n].unit == found[names[0]].unit]
         if not names or any(any(found[n].values) for n in leading):
-            told.append(clause.format(**{n: found[n] for n in names}))
-    return ", ".join(told)
+            spoken.append(clause.format(**{n: found[n] for n in names}))
+    return ", ".join(spoken)
 
 
 def clauses(listed: Sequence[dict]) -> list[str]:

@@ -139,6 +139,6 @@ def _bare(found: Fit) -> dict[tuple[str, str], np.ndarray]:
         return {}
     amplitudes = [f"effects.{e.name}.{a}" for e in model.effects for a in e.amplitudes]
     off = {p: v for p, v in found.values.items() if not any(p == a or p.startswith(f"{a}.") for a in amplitudes)}
-    told = predictor.of(tuple(found.predictions)).predict(off)
-    series = {name: {c: np.asarray(ch.values) for c, ch in r.channels.items()} for name, r in told.items()}
+    finer = predictor.of(tuple(found.predictions)).predict(off)
+    series = {name: {c: np.asarray(ch.values) for c, ch in r.channels.items()} for name, r in finer.items()}
     return {key: values for key, values, _ in _labelled(found, series)}

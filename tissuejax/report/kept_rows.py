@@ -29,8 +29,8 @@ class KeptRows(Plot):
 
     def caption(self, data: list[Considered]) -> str:
         """How much is kept, and by what."""
-        told = [f"{c.name}: {int(c.kept.sum())} of {len(c.kept)} rows. {' '.join(c.notes)}" for c in data]
-        return " ".join(told)
+        lines = [f"{c.name}: {int(c.kept.sum())} of {len(c.kept)} rows. {' '.join(c.notes)}" for c in data]
+        return " ".join(lines)
 
     def draw(self, data: list[Considered]) -> Figure:
         """Two panels a test: load over time, load over deformation, in the columns' own reading."""

@@ -66,11 +66,11 @@ def curves_of(recording: Recording, prediction: Recording | None = None, std=Non
         level = (std or {}).get(f"{recording.name}/{name}", channel.noise_std)
         drive_name, drive = _drive(recording, channel)
         if measured.ndim == 3:
-            shown, told = displacements(measured, predicted)
+            shown, modelled = displacements(measured, predicted)
             level = None if level is None else level / np.sqrt(measured.shape[1])
             time = np.asarray(channel.time, float)
             label = components(name, measured)[0][1]
-            found.append(Curve(recording.name, label, time, None, "", shown, told, channel.unit, level, held))
+            found.append(Curve(recording.name, label, time, None, "", shown, modelled, channel.unit, level, held))
             continue
         for k, label in components(name, measured):
             own = drive[:, k] if drive is not None and drive.ndim == 2 and measured.ndim == 2 else drive
@@ -134,10 +134,10 @@ def displacements(
     near = out[max(0, far - 2) : far + 3]
     way = np.nanmean(near, axis=0)
     way = way / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-300)
-    told = None if predicted is None else np.nanmean(np.einsum("nmi,mi->nm", out, way), axis=1)
+    modelled = None if predicted is None else np.nanmean(np.einsum("nmi,mi->nm", out, way), axis=1)
     shown = np.einsum("nmi,mi->nm", measured - _rest(measured), way)
     lost = ~np.isfinite(shown).any(1)
-    return np.where(lost, np.nan, np.nanmean(np.where(lost[:, None], 0.0, shown), axis=1)), told
+    return np.where(lost, np.nan, np.nanmean(np.where(lost[:, None], 0.0, shown), axis=1)), modelled
 
 
 def _rest(places: np.ndarray) -> np.ndarray:

@@ -121,8 +121,8 @@ def fingerprint(matter: Matter, grid: Grid) -> str:
     """Hash of everything that the states of a site follow from, except the site."""
     fine = np.linspace(0, 1, 17)
     shape = b"".join(np.ascontiguousarray(np.round(f(fine, fine), 9)).tobytes() for f in matter.lobe)
-    told = json.dumps(plain([described(matter), matter.radius, grid, repr(matter.settings)]), sort_keys=True)
-    return hashlib.sha256(told.encode() + shape).hexdigest()
+    text = json.dumps(plain([described(matter), matter.radius, grid, repr(matter.settings)]), sort_keys=True)
+    return hashlib.sha256(text.encode() + shape).hexdigest()
 
 
 class _Sites:

@@ -53,33 +53,33 @@ def _place(point) -> str:
 def _broken(out, scene) -> str:
     frame, element = int(out.failed), int(out.element)
     place = _place(np.asarray(scene.body.points)[np.asarray(scene.body.cells)[element]].mean(0))
-    told = (
+    said = (
         f"the simulation broke down by t = {float(out.end_time[frame]):.4g} s (frame {frame}): element {element} near "
         f"{place} is inverted or no longer finite; the step was {float(scene.clock.step) * 1e3:.3g} ms. "
     )
     if scene.faces is not None:
-        return told + (
+        return said + (
             "Where a blade enters soft tissue the first elements fold: take tissue that resists compression (K ten "
             "times the shear modulus or more), other elements there, a strength that the mesh can carry and that parts "
             "within the blade's thickness (`tissuejax cut resolve`), or begin in a short notch"
         )
     if _too_long(scene):
         critical = np.asarray(critical_steps(scene))
-        return told + (
+        return said + (
             f"The step is above the critical one, {1e3 * critical.min():.3g} ms in element {int(critical.argmin())}. "
             "Take a smaller step (stiffer parameters need one)"
         )
     if _under_probe(element, scene):
-        return told + (
+        return said + (
             "Take a smaller step (stiffer parameters need one), less time compression, less stiffness damping, or a "
             "finer mesh under the probe"
         )
     if scene.gravity is None:
-        return told + (
+        return said + (
             "The element is not under a probe: take a smaller step (stiffer parameters need one), less time "
             "compression or less stiffness damping, and look at the support's motion"
         )
-    return told + "The element is not under a probe: gravity or the support breaks it. " + weight(scene)
+    return said + "The element is not under a probe: gravity or the support breaks it. " + weight(scene)
 
 
 def weight(scene: Scene) -> str:

@@ -35,9 +35,9 @@ def rejudge(folder: Path, criteria: Criteria | None = None) -> dict[str, str]:
     out = {}
     for path in sorted(Path(folder).glob("results/*/evidence.json")):
         evidence: Evidence = read_evidence(path)
-        told = verdict_of(judge(evidence, criteria), criteria)
+        verdict = verdict_of(judge(evidence, criteria), criteria)
         result = path.with_name("result.json")
         known = json.loads(result.read_text()) if result.exists() else {}
-        write_json(result, known | told)
-        out[path.parent.name] = told["verdict"]
+        write_json(result, known | verdict)
+        out[path.parent.name] = verdict["verdict"]
     return out

@@ -158,7 +158,7 @@ def stacked(
     """Tables one under another: the union of their columns, and the column `block` where there are several."""
     names = list(dict.fromkeys(n for t in tables for n in t.names))
     units = {n: u for t in reversed(tables) for n, u in zip(t.names, t.units, strict=True)}
-    told = list(blocks) if blocks is not None else [str(k + 1) for k in range(len(tables))]
+    labels = list(blocks) if blocks is not None else [str(k + 1) for k in range(len(tables))]
     cells: dict[str, np.ndarray] = {}
     for name in names:
         parts = [
@@ -166,7 +166,7 @@ def stacked(
         ]
         cells[name] = np.array([c for part in parts for c in part], dtype=object)
     if len(tables) > 1:
-        cells[BLOCK] = np.array([b for b, t in zip(told, tables, strict=True) for _ in t.rows], dtype=object)
+        cells[BLOCK] = np.array([b for b, t in zip(labels, tables, strict=True) for _ in t.rows], dtype=object)
         units[BLOCK] = ""
     lines = np.array([t.first + k + 1 for t in tables for k in range(len(t.rows))])
-    return Exported(Columns(path, cells, lines, decimal), units, header, tuple(told), tuple(assumed))
+    return Exported(Columns(path, cells, lines, decimal), units, header, tuple(labels), tuple(assumed))

@@ -60,7 +60,7 @@ def field(path: Path, columns: FieldColumns, unit: str = "", assumed: Sequence[s
             f"{path}: found columns {', '.join(table.names)}, expected coordinates and displacements called like "
             f"{', '.join([*columns.place[:2], *columns.moved[:2]])}"
         )
-    told = next((u for k, u in enumerate(table.units) if k in (*place, *moved) and u), "") or unit
+    stated = next((u for k, u in enumerate(table.units) if k in (*place, *moved) and u), "") or unit
     numbers = np.array([[_number(c, whole.decimal) for c in row] for row in table.rows])
     at = np.stack([numbers[:, k] if k is not None else np.zeros(len(numbers)) for k in place], axis=1)
     by = np.stack([numbers[:, k] if k is not None else np.zeros(len(numbers)) for k in moved], axis=1)
@@ -69,7 +69,7 @@ def field(path: Path, columns: FieldColumns, unit: str = "", assumed: Sequence[s
     named = _find(bare, columns.label) if columns.label else None
     labels = [row[named] for row in table.rows] if named is not None else [str(i + 1) for i in range(len(at))]
     flat = () if place[2] is not None else ("the field is plane: the third coordinate is zero",)
-    return Tracked(None, np.stack([at, at + by]), tuple(labels), told, (*assumed, *flat))
+    return Tracked(None, np.stack([at, at + by]), tuple(labels), stated, (*assumed, *flat))
 
 
 def _find(names: Sequence[str], pattern: str) -> int | None:

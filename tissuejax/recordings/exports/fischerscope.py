@@ -40,8 +40,8 @@ class FischerScope(TableExport):
         numbers = [re.search(r"Value\s*:\s*(\d+)", line) for line in lines]
         names = []
         for k, table in enumerate(tables):
-            told = [numbers[i][1] for i in range(table.above, table.first) if numbers[i]]
-            names.append(told[-1] if told else str(k + 1))
+            numbered = [numbers[i][1] for i in range(table.above, table.first) if numbers[i]]
+            names.append(numbered[-1] if numbered else str(k + 1))
         assumed = ["force is in mN, depth in um and time in s, which the names of the columns don't say"]
         key_lines = [line for line in lines[:12] if re.match(r"[A-Za-z]", line)]
         return stacked(path, tables, text.header(key_lines, "\t"), names, assumed, ",")

@@ -186,8 +186,8 @@ def _heading(
     if len(places) > 1 and _are_units(near):
         names = _stripped(split(lines[places[-2]], separator))
         bracketed = all(c[0] in "([" for c in near if c)
-        told = any(quantity_of(split_unit(n)[0]) for n in names)
-        if len(names) >= 2 and not any(is_number(n, decimal) for n in names) and (bracketed or told):
+        named = any(quantity_of(split_unit(n)[0]) for n in names)
+        if len(names) >= 2 and not any(is_number(n, decimal) for n in names) and (bracketed or named):
             units = [
                 c.strip("()[] ") if readable(c.strip("()[] ")) else "" for c in split(lines[places[-1]], separator)
             ]

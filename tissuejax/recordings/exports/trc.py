@@ -26,7 +26,7 @@ class Trc(MarkerExport):
         lines = text_lines(path)
         if len(lines) < 6:
             raise InputError(f"{path}: found {len(lines)} lines, expected a TRC file's five header lines and frames")
-        told = dict(zip(lines[1].split("\t"), lines[2].split("\t")))
+        header = dict(zip(lines[1].split("\t"), lines[2].split("\t")))
         names = [n.strip() for n in lines[3].split("\t")[2:] if n.strip()]
         rows, numbers = [], []
         for number, line in enumerate(lines[4:], start=5):
@@ -48,4 +48,4 @@ class Trc(MarkerExport):
                     except ValueError:
                         raise InputError(f"{path}: line {number}: found {cell!r}, expected a number") from None
         position = data[:, 2:].reshape(len(rows), len(names), 3)
-        return Tracked(data[:, 1], position, tuple(names), told.get("Units", "").strip())
+        return Tracked(data[:, 1], position, tuple(names), header.get("Units", "").strip())

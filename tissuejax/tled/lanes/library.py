@@ -44,13 +44,13 @@ def compiler() -> str | None:
 @functools.cache
 def _around() -> str:
     """What a compiled program depends on beside its text: compiler, processor, JAX."""
-    told = subprocess.run([str(compiler()), "--version"], capture_output=True, text=True, check=False).stdout
+    output = subprocess.run([str(compiler()), "--version"], capture_output=True, text=True, check=False).stdout
     try:
         seen = Path("/proc/cpuinfo").read_text()
         flags = next((line for line in seen.splitlines() if line.startswith(("flags", "Features"))), "")
     except OSError:
         flags = platform.processor()
-    return "\n".join((told, flags, platform.machine(), jax.__version__, " ".join((*FLAGS, *VECTOR_MATH))))
+    return "\n".join((output, flags, platform.machine(), jax.__version__, " ".join((*FLAGS, *VECTOR_MATH))))
 
 
 def named(text: str) -> str:
@@ -84,7 +84,7 @@ def _compiled(text: str, name: str, kept: Path | None) -> ctypes.CDLL:
         source, made = Path(scratch, f"{name}.c"), Path(scratch, f"{name}.so")
         source.write_text(text)
         include = f"-I{jax.ffi.include_dir()}"
-        told = ""
+        output = ""
         for extra in (VECTOR_MATH, ()):
             command = [str(compiler()), *FLAGS, include, str(source), "-o", str(made), *extra, "-lm", "-Wl,-z,defs"]
             done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -92,8 +92,8 @@ def _compiled(text: str, name: str, kept: Path | None) -> ctypes.CDLL:
             if found is not None:
                 _keep(made, kept)
                 return found
-            told = done.stderr
-        raise NotCompiled(told[-500:])
+            output = done.stderr
+        raise NotCompiled(output[-500:])
 
 
 def _keep(made: Path, kept: Path | None) -> None:
