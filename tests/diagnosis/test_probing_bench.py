@@ -8,9 +8,11 @@ import pytest
 from tests.probing.bench import VALUES, measured, recording, sample
 from tissuejax.cache import source
 from tissuejax.diagnosis import probing_free
+from tissuejax.diagnosis.bench import Segment
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_runs import COARSE, FINE, RETIMED
+from tissuejax.diagnosis.probing_series import calmed
 from tissuejax.diagnosis.probing_view import LEFT, REMAINS, ProbingView
 from tissuejax.diagnosis.refit import refit
 from tissuejax.energies.catalogue import energy
@@ -130,7 +132,7 @@ def test_a_view_is_the_fine_simulation_at_its_anchor_and_weighs_every_channel_al
     other = VALUES | {"energy.C10": 1.1 * VALUES["energy.C10"]}
     twice = [bench.runs.many([(bench.at(v), bench.fitted, COARSE)])[0] for v in (VALUES, other)]
     change = near.natural(near.predict(other)) - exact
-    np.testing.assert_allclose(change, twice[1] - twice[0], rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(change, bench.calmed(twice[1] - twice[0]), rtol=1e-6, atol=1e-9)
     for channel in ("force", "markers"):
         rows = np.concatenate([view.y[s.rows] for s in view.segments if s.channel == channel])
         assert 0.9 < np.abs(rows).max() < 2.0
@@ -159,7 +161,17 @@ def test_what_is_open_is_a_column_for_every_channel_of_every_recording(bench):
         assert columns.shape == (len(bench.y), len(pairs))
         assert (np.count_nonzero(columns, axis=1) <= 1).all()
     mesh = near.numerical["mesh"].sum(axis=1) * near.unit
-    np.testing.assert_allclose(mesh, REMAINS * (fine - slow), rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(mesh, REMAINS * bench.calmed(fine - slow), rtol=1e-6, atol=1e-12)
+
+
+def test_a_wave_between_probe_and_support_is_smoothed_away_and_what_is_slow_stays():
+    time, passage = np.arange(0, 8, 0.004), 0.09
+    one = Segment("a", "force", "z", slice(0, len(time)), time, "N", np.zeros(len(time)), "depth", "m")
+    inner = slice(100, -100)  # series are reflected at their ends
+    for period, low, high in ((2 * passage, 0.0, 0.01), (4 * passage, 0.28, 0.31), (40 * passage, 0.98, 1.0)):
+        left = np.abs(calmed([one], np.sin(2 * np.pi * time / period), passage)[inner]).max()
+        assert low <= left <= high
+    assert np.allclose(calmed([one], 3.0 + time, passage)[inner], 3.0 + time[inner])
 
 
 def test_a_derivative_is_taken_from_nearby_and_anew_farther_off(bench):

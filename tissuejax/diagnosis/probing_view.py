@@ -1,16 +1,17 @@
 """Probings as they are weighed: all channels in units of their size, predicted cheaply and corrected where it counts.
 
 Most predictions come from the coarse simulation: a coarse mesh, run twice as fast as the fine one. At one set of
-values, the anchor, the coarse mesh is also run at the speed of the fine one (slow), and added is what that tells:
+values, the anchor, the fine mesh is run too, and the coarse one at the speed of the fine one (slow):
 
-    y(theta) = coarse(theta) + [fine - coarse] - late [d slow / dt]    (brackets at the anchor).
+    y(theta) = fine + calmed(coarse(theta) - coarse) - late [d slow / dt]    (without theta: at the anchor).
 
-The first bracket makes it the fine simulation there; the second takes out what that one still errs by its speed. Tissue
-that is moved faster than life is held back by damping and inertia: loading is too stiff and unloading too soft, as if
-the measurement came late, and a late clock or a tissue that remembers would be named for it. By how much, of each
-channel of each recording, is read from slow - coarse by least squares; what else the two differ in is ringing, another
-one at each speed. An error of first order in the speed (damping) is as large again as that difference, one of second
-order (inertia) a third of it: `LEFT` takes the middle, `EITHER` the half way to both.
+Only what differs slowly between two coarse runs is taken (`ProbingBench.calmed`): their ringing moved the evidence of
+one set by 15 nats between two places that describe p02 equally well. The last term takes out what the fine simulation
+still errs by its speed. Tissue that is moved faster than life is held back by damping and inertia: loading is too stiff
+and unloading too soft, as if the measurement came late, and a late clock or a tissue that remembers would be named for
+it. By how much, of each channel of each recording, is read from slow - coarse by least squares; what else the two
+differ in is ringing, another one at each speed. An error of first order in the speed (damping) is as large again as
+that difference, one of second order (inertia) a third of it: `LEFT` takes the middle, `EITHER` the half way to both.
 
 A fit is anchored anew where it came to rest. What is left open is the known part of the discrepancy: of the mesh, of
 order two, `REMAINS` of the change from coarse to fine; of the speed `EITHER` of slow - coarse.
@@ -56,7 +57,8 @@ class ProbingView(Bench):
     Attributes beyond those of `Bench`:
         source: the probings in SI units.
         origin, unit: of each row: a marker's place at rest, and the largest force or displacement.
-        shift: correction of the coarse simulation, SI; `place`: what that simulation predicts where it was taken.
+        shift: correction of the coarse simulation, SI; `place`: what that simulation predicts where it was taken; None
+            before.
         root: the base's fit, where columns of scores are taken; None until it is known.
         reach: change of the prediction up to which a derivative is taken from nearby.
     """
@@ -128,7 +130,7 @@ class ProbingView(Bench):
         late = self._held_back(slow, coarse)
         made.shift, made.place = fine - coarse + LEFT * late, coarse
         made._open = {
-            "mesh": self._errors(REMAINS * (fine - slow) / self.unit),
+            "mesh": self._errors(REMAINS * self.source.calmed(fine - slow) / self.unit),
             "speed": self._errors(EITHER * late / self.unit),
         }
         return made
@@ -161,6 +163,8 @@ class ProbingView(Bench):
         """See `Bench.predict`; NaN where a simulation broke down."""
         wanted = tuple(recordings or (*self.fitted, *self.held_out))
         told = self.source.runs.many([(self.source.at(values), wanted, COARSE)])[0]
+        if self.place is not None:
+            told = self.place + self.source.calmed(told - self.place)
         return (told + self.shift - self.origin) / self.unit
 
     def rooted(self, values: Mapping[str, float]) -> "ProbingView":
@@ -226,7 +230,7 @@ class ProbingView(Bench):
             own = [np.r_[s.rows] for s in self.segments if s.channel == channel and s.recording in recordings]
             rows = np.concatenate(own) if own else np.zeros(0, int)
             size = float(np.linalg.norm((one - self.origin)[rows] / self.unit[rows]))
-            moved = float(np.linalg.norm(((other - one) / self.unit)[rows]))
+            moved = float(np.linalg.norm((self.source.calmed(other - one) / self.unit)[rows]))
             out = max(out, moved / max(size, 1e-300))
         return out
 
