@@ -67,7 +67,7 @@ def fit_cut(
     names: tuple[str, ...] = (),
     by: str = "simulation",
     settings: CuttingSettings | None = None,
-    max_steps: int = 12,
+    max_steps: int = 8,
     numerical: bool = True,
 ) -> CutFit:
     """Fit the cuts of a sample.
@@ -166,7 +166,7 @@ def _rounds(made, free, values, max_steps) -> tuple[Problem, Descent, bool, int]
             values = values | {STRENGTH: values[STRENGTH] / 2}
         else:
             before, values = values, posed.values(ended.y)
-            if n and max(abs(np.log(values[p] / before[p])) for p in LATER) < np.log(SAME):
+            if n and ended.converged and max(abs(np.log(values[p] / before[p])) for p in LATER) < np.log(SAME):
                 return posed, ended, True, runs
         made = made.prepared(values)
     return posed, ended, False, runs
