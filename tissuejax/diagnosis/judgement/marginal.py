@@ -10,8 +10,7 @@ o being theta less the prior's mean. Smooth parts and parameters are handled ali
 precisions 1 and `weak`: all costs are those of the blocks. Amplitudes a = sqrt(v) have half-normal priors with a
 heavier tail (`Widths`), so in v the whole has a slope at zero and an amplitude can rest there.
 
-Source: restricted likelihood, Harville 1977, JASA 72; Woodbury's identity; Laplace's method for posterior mass, Kass
-and Raftery 1995, JASA 90, sec. 4.1.
+Source: restricted likelihood, Harville 1977, JASA 72; Woodbury's identity.
 """
 
 import math
@@ -23,12 +22,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpotrf, dpotri
-from scipy.optimize import brentq, lsq_linear
-from scipy.special import logsumexp
+from scipy.optimize import lsq_linear
 
 from tissuejax.estimation.discrepancy import Part
-
-NODES = np.polynomial.legendre.leggauss(40)
 
 
 @dataclass(frozen=True)
@@ -60,21 +56,31 @@ class Marginal:
     value: float
     precision: Float[np.ndarray, "p p"]
     step: Float[np.ndarray, " p"]
-    _derivatives: Callable[[], tuple[np.ndarray, np.ndarray]] = field(repr=False)
+    _derivatives: Callable[[], tuple[np.ndarray, np.ndarray, dict[int, tuple]]] = field(repr=False)
 
     @cached_property
-    def _both(self) -> tuple[np.ndarray, np.ndarray]:
+    def _all(self) -> tuple[np.ndarray, np.ndarray, dict[int, tuple]]:
         return self._derivatives()
 
     @property
     def slope(self) -> Float[np.ndarray, " K"]:
         """First derivative by the squared amplitudes."""
-        return self._both[0]
+        return self._all[0]
 
     @property
     def fisher(self) -> Float[np.ndarray, "K K"]:
         """Expected second derivative, sign turned; between blocks P is taken as block-diagonal for two parts within."""
-        return self._both[1]
+        return self._all[1]
+
+    def along(self, k: int, d: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+        """What the log evidence changes by where the squared amplitude of a smooth part k does by d, the others kept.
+
+        Exact: with A = F'PF and b = F'P r of the part's factor F, -1/2 log|I + d A| + d/2 b'(I + d A)^-1 b.
+        """
+        inner, b = self._all[2][k]
+        size, turn = np.linalg.eigh(inner)
+        grown = np.maximum(1 + np.outer(d, np.maximum(size, 0.0)), 1e-12)
+        return -0.5 * np.sum(np.log(grown), axis=1) + 0.5 * d * np.sum((turn.T @ b) ** 2 / grown, axis=1)
 
 
 @dataclass(frozen=True)
@@ -114,7 +120,7 @@ def inverted(block: Float[np.ndarray, "n n"]) -> tuple[Float[np.ndarray, "n n"],
 def smooth(parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> Float[np.ndarray, "N q"]:
     """U sqrt(V): the columns of the smooth parts that act."""
     acting = [math.sqrt(x) * p.factor for p, x in zip(parts, v, strict=True) if p.factor is not None and x > 0]
-    n = next(len(p.factor) for p in parts if p.factor is not None)
+    n = len(parts[0].factor) if parts[0].factor is not None else sum(len(b) for b in parts[0].within)
     return np.concatenate(acting, axis=1) if acting else np.zeros((n, 0))
 
 
@@ -159,8 +165,9 @@ def _derivatives(
     g: Float[np.ndarray, "N w"],
     half: Float[np.ndarray, "N w"],
     left: Float[np.ndarray, " N"],
-) -> tuple[Float[np.ndarray, " K"], Float[np.ndarray, "K K"]]:
-    """Slope 1/2 (z'B z - tr P B), z = K^-1 r, and Fisher information 1/2 tr(P B_a P B_b), with P = D^-1 - half g'."""
+) -> tuple[Float[np.ndarray, " K"], Float[np.ndarray, "K K"], dict[int, tuple[np.ndarray, np.ndarray]]]:
+    """Slope 1/2 (z'B z - tr P B), z = K^-1 r, and Fisher information 1/2 tr(P B_a P B_b), with P = D^-1 - half g'; of
+    each smooth part, F'PF and F'z."""
     soft = [k for k, part in enumerate(parts) if part.factor is not None]
     hard = [k for k, part in enumerate(parts) if part.factor is None]
     slope, fisher = np.zeros(len(parts)), np.zeros((len(parts), len(parts)))
@@ -168,15 +175,18 @@ def _derivatives(
     edges = np.cumsum([0, *(parts[k].factor.shape[1] for k in soft)])[:-1]
     light = np.concatenate([i @ u[rows] for i, rows in zip(inverse, blocked.rows, strict=True)])
     moved = light - half @ (g.T @ u)  # P U
+    inner, pull = u.T @ moved, u.T @ left
+    ends = [*edges, u.shape[1]]
+    own = {k: (inner[a:b, a:b], pull[a:b]) for k, a, b in zip(soft, ends, ends[1:], strict=False)}
     if soft:
         trace = np.add.reduceat(np.sum(moved * u, axis=0), edges)
-        slope[soft] = np.add.reduceat((u.T @ left) ** 2, edges) - trace
-        square = np.add.reduceat(np.add.reduceat((u.T @ moved) ** 2, edges, axis=0), edges, axis=1)
+        slope[soft] = np.add.reduceat(pull**2, edges) - trace
+        square = np.add.reduceat(np.add.reduceat(inner**2, edges, axis=0), edges, axis=1)
         fisher[np.ix_(soft, soft)] = 0.5 * (square + square.T)
-    for i, (own, rows) in enumerate(zip(inverse, blocked.rows, strict=True)):
-        n = len(own)
+    for i, (light, rows) in enumerate(zip(inverse, blocked.rows, strict=True)):
+        n = len(light)
         within = np.stack([parts[k].within[i] for k in hard]) if hard else np.zeros((0, n, n))
-        p = own - half[rows] @ g[rows].T
+        p = light - half[rows] @ g[rows].T
         slope[hard] += (within @ left[rows]) @ left[rows] - within.reshape(-1, n * n) @ p.ravel()
         crossed = within @ p
         turned = crossed.transpose(0, 2, 1).reshape(-1, n * n)
@@ -186,7 +196,7 @@ def _derivatives(
                 mixed = np.add.reduceat(np.sum((block @ moved[rows]) * moved[rows], axis=0), edges)
                 fisher[k, soft] += mixed
                 fisher[soft, k] += mixed
-    return 0.5 * slope, 0.5 * fisher
+    return 0.5 * slope, 0.5 * fisher, own
 
 
 @dataclass(frozen=True)
@@ -284,56 +294,3 @@ def amplitudes(
         if gained < tolerance:
             break
     return u * unit, m
-
-
-def amplitude_mass(
-    linear: Linear, parts: Sequence[Part], priors: Widths, blocked: Blocked, v: Float[np.ndarray, " K"], m: Marginal
-) -> float:
-    """Log of the posterior mass over the amplitudes, over the evidence at its maximum: priors and Occam's factor.
-
-    The evidence of an amplitude at rest is taken quadratic in v, of one that moved quadratic in ln(v + c), c such that
-    it falls to what the evidence is without that part; with the prior integrated over a = sqrt(v) by quadrature,
-    correlations by their determinant.
-    """
-    x, weights = NODES
-    moving = np.flatnonzero(v > 1e-3 * priors.width**2)
-    slope, curvature, total = np.array(m.slope), np.maximum(np.diag(m.fisher), 1e-300), 0.0
-    tilt = slope + priors.slope(v / priors.width**2) / priors.width**2  # of the whole, prior and all
-    for k, (at, g, h) in enumerate(zip(v.tolist(), slope.tolist(), curvature.tolist(), strict=True)):
-        wide, offset = 8 / math.sqrt(h), math.inf
-        if k in moving:
-            without = v.copy()
-            without[k] = 0.0
-            g, offset = max(g, 0.0), _offset(at, g, h, m.value - marginal(linear, parts, without, blocked).value)
-        elif tilt[k] < 0:
-            wide = min(wide, 30 / -tilt[k])
-        low, top = math.sqrt(max(at - wide, 0.0)), math.sqrt(at + wide)
-        if math.isfinite(offset):
-            reach = math.exp(min(8 / (math.sqrt(h) * (at + offset)), 9.0))
-            low, top = (
-                math.sqrt(max((at + offset) / reach - offset, 0.0)),
-                math.sqrt(at + offset) * reach**0.5,
-            )
-        a = low + 0.5 * (top - low) * (x + 1)
-        d = a**2 - at if math.isinf(offset) else (at + offset) * np.log((a**2 + offset) / (at + offset))
-        density = priors.part(k).log_density((a**2)[:, None])[:, 0]
-        total += float(logsumexp(g * d - 0.5 * h * d**2 + density, b=0.5 * (top - low) * weights))
-    if len(moving) > 1:
-        f = m.fisher[np.ix_(moving, moving)]
-        scale = 1 / np.sqrt(np.diag(f))
-        total -= 0.5 * float(np.linalg.slogdet(f * np.outer(scale, scale) + 1e-3 * np.eye(len(moving)))[1])
-    return total
-
-
-def _offset(at: float, slope: float, curvature: float, fall: float) -> float:
-    """c with slope d - curvature d^2 / 2 = -fall at v = 0, d = (at + c) ln((v + c) / (at + c)); infinite where none."""
-
-    def short(log_c: float) -> float:
-        c = at * math.exp(log_c)
-        d = (at + c) * math.log(c / (at + c))
-        return fall + slope * d - 0.5 * curvature * d**2
-
-    low, high = -30.0, 10.0
-    if short(high) <= 0 or short(low) >= 0:
-        return math.inf if short(high) <= 0 else at * math.exp(low)
-    return at * math.exp(brentq(short, low, high, xtol=1e-2))

@@ -26,10 +26,10 @@ from tissuejax.diagnosis.judgement.marginal import (
     Linear,
     Marginal,
     Widths,
-    amplitude_mass,
     amplitudes,
     smooth,
 )
+from tissuejax.diagnosis.judgement.mass import amplitude_mass
 from tissuejax.diagnosis.judgement.rest import beyond, numerical, rest, wobble
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.refit import Descent, Refit, refit
