@@ -9,6 +9,7 @@ from tests.cutting.records import TRUTH, model, record, sample, simulated, strok
 from tissuejax.cohesion.catalogue import law
 from tissuejax.energies.neo_hookean import NeoHookean
 from tissuejax.energies.volumetric import Quadratic
+from tissuejax.errors import InputError
 from tissuejax.experiments.cutting_blocks import blocks
 from tissuejax.experiments.cutting_record import path_of
 from tissuejax.fitting.cut import fit_cut
@@ -54,6 +55,14 @@ def test_the_example_is_recovered_by_the_balance():
     assert STRENGTH in found.unidentified
     assert not found.warnings
     assert len(found.predicted["there-back-again"].channels["cutting_force"].values) == 481
+
+
+@pytest.mark.parametrize("energy", [-2.0, 1.25e-4])
+def test_an_energy_that_no_tissue_has_is_refused_before_the_fit(energy):
+    time, x = strokes(-0.002, 0.026, rate=20.0)
+    made = sample(record("r", time, x, 0 * x + 0.1))
+    with pytest.raises(InputError, match=r"cohesion.energy|energy in J"):
+        fit_cut(made, model(), KNOWN, {ENERGY: energy}, by="balance")
 
 
 @pytest.mark.parametrize("noise", [0.002, None])

@@ -25,6 +25,7 @@ from tissuejax.experiments.cutting_record import FORCE, Path, drawn
 from tissuejax.experiments.cutting_run import CuttingSettings, element_size
 from tissuejax.experiments.predictor import predictor
 from tissuejax.fitting.cut_balance import by_balance, linear
+from tissuejax.fitting.cut_resolution import plane_modulus, refuse_joules
 from tissuejax.fitting.cut_result import ENERGY, FRICTION, OPEN, STRENGTH, CutFit, described, misfit_said
 from tissuejax.fitting.least_squares import descend
 from tissuejax.fitting.levenberg_marquardt import Descent
@@ -32,10 +33,11 @@ from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.setup import problem
 from tissuejax.fitting.uncertainty import uncertainty
 from tissuejax.model import Model
+from tissuejax.parameters import checked, under
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 COARSER = 1.5
-ROUNDS = 8
+ROUNDS = 12
 NEAR, FAR = 1e-3, 1e-2  # relative decrease of the misfit at which a descent ends: the last, the others
 SAME = 1.3  # a slice made for a strength serves up to this ratio
 # How far strength and energy may go from where a slice was made, in its first round and in later ones: toughness and
@@ -67,7 +69,7 @@ def fit_cut(
     names: tuple[str, ...] = (),
     by: str = "simulation",
     settings: CuttingSettings | None = None,
-    max_steps: int = 8,
+    max_steps: int = 4,
     numerical: bool = True,
 ) -> CutFit:
     """Fit the cuts of a sample.
@@ -82,7 +84,8 @@ def fit_cut(
         by: "simulation", or "balance" (no strength). numerical: add the step between two meshes to the errors.
 
     Raises:
-        InputError: no cuts, or nothing known of the tissue: toughness and wedging have one sum in one pass.
+        InputError: no cuts, values out of their range (an energy in J), or nothing known of the tissue: toughness
+            and wedging have one sum in one pass.
     """
     names = names or tuple(n for n, r in sample.recordings.items() if r.experiment == "cutting")
     if not names:
@@ -96,6 +99,9 @@ def fit_cut(
         )
     if not any(e.name == "blade-friction" for e in model.effects):
         model = model.with_effects(effect("blade-friction"))
+    for given in (known, start or {}):
+        checked(given, model.across(names).parameters)
+        refuse_joules(given.get(ENERGY, np.inf))
     first = by_balance(sample, model, known, names, dict(start or {}))
     if by == "balance":
         return first
@@ -151,7 +157,7 @@ def fit_cut(
     status = "converged" if settled else ended.reason if not ended.converged else "slice and estimate do not settle"
     worst = max(float(x.imbalance) for x in ran.values())
     chi2 = float(r @ r / len(r))
-    said = misfit_said(chi2, posed)
+    said = (*misfit_said(chi2, posed), *_unresolved(plain, values, thickness, max(sizes.values()), free, why))
     return CutFit(values, std, shift, why, chi2, status, runs, by, posed.predictor, predicted, worst, said)
 
 
@@ -159,7 +165,8 @@ def _rounds(made, free, values, max_steps) -> tuple[Problem, Descent, bool, int]
     """Descents from one start, the slice made anew between them: the last, whether they settled, runs.
 
     Settled is what a slice made for it leaves in place, by a descent that converges or finds less than `FAR` to gain
-    (facets that come over an edge put kinks into the misfit, on which a descent may shrink its steps for ever).
+    (facets that come over an edge put kinks into the misfit, on which a descent may shrink its steps for ever; a slice
+    made anew gets it off them, so few evaluations are spent on each).
     """
     runs = 0
     for n in range(ROUNDS):
@@ -208,8 +215,29 @@ def _unidentified(p, values, std, free, at_bound) -> dict[str, str]:
     return why
 
 
+def _unresolved(model: Model, values, thickness: float, h: float, free, why: dict[str, str]) -> tuple[str, ...]:
+    """A warning where faces hold on beside the blade; into `why` a fitted strength that elements of size h do not
+    resolve."""
+    mu = float(model.energy.initial_shear_modulus(under("energy", values)))
+    bulk = float(model.volumetric.bulk_modulus(under("volumetric", values)))
+    cohesive = plane_modulus(mu, bulk) * values[ENERGY] / values[STRENGTH] ** 2
+    if STRENGTH in free and cohesive < h:
+        why[STRENGTH] = (
+            f"elements of {1e3 * h:.3g} mm do not resolve it (cohesive length {1e3 * cohesive:.3g} mm), so it is a "
+            "number of the mesh: `tissuejax cut resolve` says which would"
+        )
+    apart = 2 * values[ENERGY] / values[STRENGTH]
+    if apart <= thickness:
+        return ()
+    return (
+        f"the blade is thinner ({1e3 * thickness:.3g} mm) than the separation ({1e3 * apart:.3g} mm): the tissue holds "
+        "on beside its flats, so toughness and strength are not told apart well",
+    )
+
+
 def along(found: CutFit, knots: int = 18, roughness: float = 0.05) -> Float[np.ndarray, "k 2"]:
-    """Toughness along the path, one value a knot: place (m) and J/m^2, by the reverse mode of the balance of energies.
+    """Toughness along the path, by the reverse mode of the balance of energies: place (m) and J/m^2 of each knot that
+    the cut came to.
 
     The misfit over the noise plus the squared steps from knot to knot over `roughness` (of the toughness) is made
     least.
@@ -239,5 +267,7 @@ def along(found: CutFit, knots: int = 18, roughness: float = 0.05) -> Float[np.n
     start = np.zeros(knots)
     best = minimize(lambda m: tuple(np.asarray(x, float) for x in slope(m)), start, jac=True, method="L-BFGS-B",
                     bounds=[(-0.95, 10.0)] * knots)  # fmt: skip
-    length = p.paths_of[name].length
-    return np.stack([np.linspace(0, length, knots), values[ENERGY] * (1 + best.x)], 1)
+    path = p.paths_of[name]
+    at = np.linspace(0, path.length, knots)
+    told = at <= path.front.max()  # beyond, nothing was cut
+    return np.stack([at, values[ENERGY] * (1 + best.x)], 1)[told]

@@ -13,6 +13,7 @@ from tissuejax.errors import InputError
 
 SPAN = 3  # elements that the cohesive length should span
 NANOSECONDS = 200.0  # an element and step, one core, double precision
+LEAST = 0.01  # J/m^2: no tissue has so little
 TOUGH = (1.0, 2000.0)  # J/m^2: soft tissue that was ever cut lies between
 
 
@@ -47,13 +48,8 @@ def resolution(
     for name, value in given.items():
         if not value > 0 or not math.isfinite(value):
             raise InputError(f"{name} {value}: it must be positive")
-    if energy < 0.01:
-        raise InputError(
-            f"energy {energy:.3g} J/m^2: tissue has {TOUGH[0]:g} to {TOUGH[1]:g} J/m^2. Is it an energy in J (the "
-            "integral "
-            "of a force over a path)? Divide by the area cut, path times depth: 0.125 mJ over 1 mm by 5 mm are 25 J/m^2"
-        )
-    plane = 4 * mu * (bulk + mu / 3) / (bulk + 4 * mu / 3)  # E / (1 - nu^2)
+    refuse_joules(energy)
+    plane = plane_modulus(mu, bulk)
     cohesive, apart = plane * energy / strength**2, 2 * energy / strength
     carried = math.sqrt(9 * math.pi * plane * energy / (32 * SPAN * h))
     wave = math.sqrt((bulk + 4 / 3 * mu) / density)
@@ -92,3 +88,18 @@ def resolution(
     if cohesive < h:
         said.append("not identified on this mesh: the strength at all; what the fit calls so is numerical.")
     return Resolution(cohesive, apart, carried, step, steps, elements, seconds, tuple(said))
+
+
+def plane_modulus(mu: float, bulk: float) -> float:
+    """E' = E / (1 - nu^2) at rest, Pa, from shear and bulk modulus."""
+    return 4 * mu * (bulk + mu / 3) / (bulk + 4 * mu / 3)
+
+
+def refuse_joules(energy: float) -> None:
+    """Raise on an energy per area that can only be an energy."""
+    if energy < LEAST:
+        raise InputError(
+            f"energy {energy:.3g} J/m^2: tissue has {TOUGH[0]:g} to {TOUGH[1]:g} J/m^2. Is it an energy in J (the "
+            "integral of a force over a path)? Divide by the area cut, path times depth: 0.125 mJ over 1 mm by 5 mm "
+            "are 25 J/m^2"
+        )

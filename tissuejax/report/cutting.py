@@ -70,18 +70,22 @@ def _saw(teeth):
 
 def _strengths(teeth):
     figure, axes = grid(2, 2, 9.0, 3.0)
-    for name, found in teeth.items():
-        n = np.arange(1, len(found.teeth) + 1)
-        for k, s in enumerate(SECTIONS):
-            label = f"{1e3 * s:.1f} mm"
-            label = label if len(teeth) == 1 else f"{name}, {label}"
+    wide = 0.8 / len(teeth)
+    for i, (name, found) in enumerate(teeth.items()):
+        n, color = np.arange(1, len(found.teeth) + 1), SERIES[i % len(SERIES)]
+        for s, mark in zip(SECTIONS, "o^x", strict=True):
+            strong = [1e-3 * t.strength[s][0] for t in found.teeth]
             axes[0].plot(
-                n, [1e-3 * t.strength[s][0] for t in found.teeth], "o-", color=SERIES[k], ms=3, lw=1, label=label
+                n, strong, f"{mark}-", color=color, ms=5, lw=0.8, fillstyle="none", label=f"{name}, {1e3 * s:g}"
             )
-        axes[1].bar(n, [t.per_area for t in found.teeth], color=MODEL, alpha=0.8)
+        height = [t.per_area for t in found.teeth]
+        axes[1].bar(n + (i - (len(teeth) - 1) / 2) * wide, height, 0.9 * wide, color=color, label=name)
     axes[0].set(xlabel="tooth", ylabel="normal strength (kPa)")
     axes[1].set(xlabel="tooth", ylabel="energy over area (J/m²)")
-    axes[0].legend(fontsize=7, frameon=False, title="section of the edge", title_fontsize=7)
+    for ax in axes:
+        ax.xaxis.get_major_locator().set_params(integer=True)
+    axes[0].legend(fontsize=6, frameon=False, title="section of the edge, mm", title_fontsize=6)
+    axes[1].legend(fontsize=7, frameon=False)
     return figure
 
 
@@ -102,5 +106,6 @@ def _overlay(found: CutFit):
 def _field(field):
     figure, axes = grid(1, 1, 7.0, 2.7)
     axes[0].plot(1e3 * field[:, 0], field[:, 1], "o-", color=MODEL, markersize=4)
-    axes[0].set(xlabel="along the path (mm)", ylabel="toughness (J/m²)", ylim=(0, None))
+    axes[0].set(xlabel="along the path (mm)", ylabel="toughness (J/m²)")
+    axes[0].set_ylim(0, 1.1 * field[:, 1].max())
     return figure
