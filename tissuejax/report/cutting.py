@@ -82,8 +82,9 @@ def _strengths(teeth):
         axes[1].bar(n + (i - (len(teeth) - 1) / 2) * wide, height, 0.9 * wide, color=color, label=name)
     axes[0].set(xlabel="tooth", ylabel="normal strength (kPa)")
     axes[1].set(xlabel="tooth", ylabel="energy over area (J/m²)")
+    most = max(len(found.teeth) for found in teeth.values())
     for ax in axes:
-        ax.xaxis.get_major_locator().set_params(integer=True)
+        ax.set_xticks(np.arange(1, most + 1, max(1, most // 10)))
     axes[0].legend(fontsize=6, frameon=False, title="section of the edge, mm", title_fontsize=6)
     axes[1].legend(fontsize=7, frameon=False)
     return figure
