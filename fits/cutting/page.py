@@ -36,9 +36,17 @@ def write(folder: Path, found: dict) -> Path:
         figure = Figure(figsize=(8, 2.8 * len(runs)), layout="constrained")
         for ax, r in zip(np.atleast_1d(figure.subplots(len(runs), 1)), runs, strict=True):
             at, seen, made = r["record"]
-            ax.plot(at, seen, ".", color="0.5", markersize=3, label="record (mesh twice as fine, noise), smoothed")
+            ax.plot(
+                at,
+                seen,
+                ".",
+                color="0.5",
+                markersize=3,
+                label="record (mesh twice as fine, noise): means over 1 mm of the way",
+            )
             ax.plot(at, made, linewidth=1.4, label="fitted")
-            ax.set(xlabel="time (s)", ylabel="force (N)", title=r["what"])
+            ax.set(xlabel="time (s)", ylabel="force (N)")
+            ax.set_title(f"{r['what']}; start: {r['start']}", fontsize=9)
             ax.legend(frameon=False, fontsize=8)
         shown += [_kept(folder, "recovery", "A record of a mesh twice as fine, fitted from 50 % off.", figure)]
     if any("series" in r for r in found.get("steady", {}).get("runs", [])):
@@ -50,5 +58,25 @@ def write(folder: Path, found: dict) -> Path:
         ax.set(xlabel="travel of the blade (mm)", ylabel="force per depth (N/m)")
         ax.legend(frameon=False, fontsize=8)
         shown += [_kept(folder, "force", "Force on the blade; dashed: closed form.", figure)]
+    if "meshes" in found:
+        figure = Figure(figsize=(8, 3.2), layout="constrained")
+        ax = figure.subplots()
+        for r in found["meshes"]["runs"]:
+            at, force = (np.asarray(x) for x in r["series"])
+            ax.plot(at, np.convolve(force, np.ones(40) / 40, "same"), label=f"h {r['h_mm']:g} mm", linewidth=1.2)
+        ax.set(xlabel="edge of the blade (mm)", ylabel="force per depth, over 1 mm (N/m)")
+        ax.legend(frameon=False, fontsize=8)
+        shown += [_kept(folder, "entry", "A blade goes into an uncut front: three meshes, one law.", figure)]
+    if "source" in found:
+        figure = Figure(figsize=(8, 3.2), layout="constrained")
+        ax = figure.subplots()
+        at, against, along = (np.asarray(x) for x in found["source"]["series"])
+        ax.plot(at, against, label="against the motion", linewidth=1.2)
+        ax.plot(at, along, label="along the blade", linewidth=1.2)
+        level = found["source"]["published_peak_N_m"]
+        ax.axhline(level, color="k", linewidth=0.8, linestyle="--", label="published strength times thickness")
+        ax.set(xlabel="edge of the blade (mm)", ylabel="force over depth (N/m)")
+        ax.legend(frameon=False, fontsize=8)
+        shown += [_kept(folder, "source", "The source's run with a toughness that its force implies.", figure)]
     page = render("cutting.html.j2", title="Is the cutting simulation right?", tables=tables, figures=shown)
     return write_text(folder / "report.html", page)
