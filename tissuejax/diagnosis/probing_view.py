@@ -45,7 +45,7 @@ REACH, SHARP = 0.03, 0.01  # relative change of the prediction up to which a der
 # the same for the correction: while the base is fitted; and about it, where one correction for all sets leaves its own
 # errors (meshes ring, a few nats' worth) out of their comparison
 STAYS, COMMON = 0.03, 0.15
-REMAINS = 1.29  # mesh of 12 to 16 elements: 1 / (16^2 / 12^2 - 1)
+REMAINS = 0.48  # mesh of 12 x 12 x 5 to 22 x 22 x 8 elements, 1.75 times finer: 1 / (1.75^2 - 1)
 TOUCHING = 0.05  # of the depth: where a shift of the surface is no small part of it
 CALMED = 3.0  # samples over which a rate is smoothed, so that it doesn't ring
 LEFT, EITHER = 2 / 3, 1 / 3  # of the change from twice the speed: 1 / (2^p - 1) for order p = 1 and 2
