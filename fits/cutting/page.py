@@ -63,7 +63,9 @@ def write(folder: Path, found: dict) -> Path:
         ax = figure.subplots()
         for r in found["meshes"]["runs"]:
             at, force = (np.asarray(x) for x in r["series"])
-            ax.plot(at, np.convolve(force, np.ones(40) / 40, "same"), label=f"h {r['h_mm']:g} mm", linewidth=1.2)
+            ax.plot(
+                at[20:-19], np.convolve(force, np.ones(40) / 40, "valid"), label=f"h {r['h_mm']:g} mm", linewidth=1.2
+            )
         ax.set(xlabel="edge of the blade (mm)", ylabel="force per depth, over 1 mm (N/m)")
         ax.legend(frameon=False, fontsize=8)
         shown += [_kept(folder, "entry", "A blade goes into an uncut front: three meshes, one law.", figure)]
