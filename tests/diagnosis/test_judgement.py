@@ -40,9 +40,9 @@ def test_no_other_verdict_has_a_larger_stated_probability(seed):
 
 
 def test_probabilities_by_hand():
-    """Two sets: odds are prior odds times the ratio of evidences; slack has a third of 0.4, one form."""
-    j = judge(evidence(weighed([], 0.0), weighed(["slack"], math.log(12.0))))
-    odds = 12.0 * (0.4 / 3) / 0.4
+    """Two sets: odds are prior odds times the ratio of evidences to a power; slack has a third of 0.4, one form."""
+    j = judge(evidence(weighed([], 0.0), weighed(["slack"], math.log(1000.0))), Criteria(power=0.5))
+    odds = math.sqrt(1000.0) * (0.4 / 3) / 0.4
     assert j.inclusion["slack"] == pytest.approx(odds / (1 + odds))
     assert j.kind is Kind.FOUND
     assert j.names == ("slack",)
@@ -79,7 +79,7 @@ def test_equal_evidence_of_several_names_is_ambiguous():
 
 
 def test_a_name_that_two_sets_share_is_found_though_neither_set_is_sure():
-    pair = weighed(["relaxation", "slack"], math.log((0.4 / 3) / (0.15 / 3)))
+    pair = weighed(["relaxation", "slack"], math.log((0.4 / 3) / (0.15 / 3)) / Criteria().power)
     j = judge(evidence(weighed([], -50.0), weighed(["relaxation"], 0.0), pair))
     assert j.inclusion["relaxation"] == pytest.approx(1.0)
     assert j.inclusion["slack"] == pytest.approx(0.5, abs=1e-6)

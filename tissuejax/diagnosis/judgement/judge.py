@@ -1,7 +1,8 @@
 """From evidence to a verdict, by the rules of probability alone: the same evidence, the same answer, in milliseconds.
 
-The posterior of a set is its prior times its evidence, over the sum of all that were weighed (what was never tried has
-none, and that is said). Effects are named that are likelier present than not. The five answers divide what may be true:
+The posterior of a set is its prior times its evidence, to a power (`Criteria.power`), over the sum of all that were
+weighed (what was never tried has none, and that is said). Effects are named that are likelier present than not. The
+five answers divide what may be true:
 
 - nothing-missing: no effect of the catalogue, and a rest that is negligible;
 - unexplained: no effect of the catalogue, and a rest that is not negligible;
@@ -88,7 +89,8 @@ def judge(evidence: Evidence, criteria: Criteria | None = None) -> Judgement:
     usable = [s for s in evidence.sets if not s.void and math.isfinite(s.log_evidence)]
     groups: dict[frozenset, list[tuple[float, SetEvidence]]] = {}
     for s in usable:
-        groups.setdefault(frozenset(s.names), []).append((s.log_evidence + log_prior(s, evidence.forms, criteria), s))
+        weight = criteria.power * s.log_evidence + log_prior(s, evidence.forms, criteria)
+        groups.setdefault(frozenset(s.names), []).append((weight, s))
     weights = {k: float(logsumexp([w for w, _ in rows])) for k, rows in groups.items()}
     whole = float(logsumexp(list(weights.values())))
     p = {k: math.exp(w - whole) for k, w in weights.items()}
