@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
+from tissuejax.challenge import cutting_cases
 from tissuejax.challenge.cutting_foundation import Knife, Slab, draw
+from tissuejax.challenge.grade import summary
+from tissuejax.challenge.verdicts import mark
 
 SLAB, TOUGH = Slab(0.012, 0.0115, 2500.0, 30000.0, 0.5), 20.0
 PLACES = np.concatenate([[-0.003, 0.005], np.arange(0.005, 0.0065, 1.37e-5)])
@@ -47,3 +50,17 @@ def test_friction_turns_what_presses_on_bevel_and_flat():
     behind = 3e-4 / knife.slope  # where the flats begin
     turned = plain.mean() * (1 + m / knife.slope) / (1 - m * knife.slope)
     assert base + slope * behind == pytest.approx(turned, rel=0.01)
+
+
+@pytest.mark.parametrize(("index", "category", "effects"), [(0, "none", []), (1, "one", ["blade-friction"])])
+def test_a_sealed_cut_has_a_key_that_is_graded(index, category, effects, monkeypatch):
+    """The table of rates counts the categories that it knows, and nothing else."""
+    cheap = lambda slab, knife, x, *_, notch=0, friction=0: np.where(x > 0, 20.0, 0.0) * (1 + 3 * friction)  # noqa: E731
+    monkeypatch.setattr(cutting_cases, "drawn", cheap)
+    key = cutting_cases.draw("c", 5, index).key
+    assert (key["category"], key["effects"]) == (category, effects)
+    answer = {"verdict": "found" if effects else "nothing-missing", "effects": effects}
+    rates = summary([mark("c", key, answer)])["rates"]
+    counted = {k: r["of"] for k, r in rates.items() if r["of"]}
+    assert ("single above 3 noise: right and no other" in counted) == (category == "one"), counted
+    assert ("nulls: false alarm" in counted) == (category == "none"), counted

@@ -75,7 +75,7 @@ def draw(name: str, seed: int, index: int) -> Case:
         strength *= float(np.clip(6 / max(size, 1e-3), 0.2, 5.0))
     seen = {t.name: f + noise * rng.standard_normal(len(f)) for t, f in zip(trials, force.values(), strict=True)}
     key = {
-        "category": "single" if picked else "none", "effects": [picked] if picked else [], "plain": {},
+        "category": "one" if picked else "none", "effects": [picked] if picked else [], "plain": {},
         "size_over_noise": {picked: size} if picked else {}, "truth": {"G": G, "strength_Pa": tau, "amount": strength},
         "noise": {"std": noise, "correlation": 0.0}, "held_out": trials[-1].name,
         "truth_error_over_noise": {t.name: 1.0 for t in trials},

@@ -39,7 +39,10 @@ says what simpler ways of answering would have said on the same cases.
         parser.add_argument("action", choices=("make", "run", "judge", "grade", "rivals"), help="what to do")
         parser.add_argument("folder", type=Path, metavar="FOLDER", help="the challenge")
         parser.add_argument(
-            "--kind", choices=KINDS, default="material", help="make: material tests (default), probing, or rest"
+            "--kind",
+            choices=KINDS,
+            default="material",
+            help="make: material tests (default), probing, rest, or cutting",
         )
         parser.add_argument("--count", type=int, default=200, metavar="N", help="make: number of cases (default 200)")
         parser.add_argument("--seed", type=int, default=1, help="make: the same seed gives the same cases (default 1)")
