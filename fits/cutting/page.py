@@ -16,6 +16,24 @@ def _kept(folder: Path, name: str, caption: str, figure: Figure) -> dict:
     return {"name": name, "caption": caption, "png": picture}
 
 
+def _curves(curves, xlabel: str, ylabel: str, level: float | None = None, said: str | None = None) -> Figure:
+    """Curves of (label, x, y) over each other, and a level to hold them against."""
+    figure = Figure(figsize=(8, 3.2), layout="constrained")
+    ax = figure.subplots()
+    for label, x, y in curves:
+        ax.plot(x, y, label=label, linewidth=1.2)
+    if level is not None:
+        ax.axhline(level, color="k", linewidth=0.8, linestyle="--", label=said)
+    ax.set(xlabel=xlabel, ylabel=ylabel)
+    ax.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def _means(at, force) -> tuple[np.ndarray, np.ndarray]:
+    """Means over 40 samples, 1 mm of the way, and where each stands."""
+    return np.asarray(at)[20:-19], np.convolve(force, np.ones(40) / 40, "valid")
+
+
 def write(folder: Path, found: dict) -> Path:
     """report.html and the figures from result.json."""
     tables = []
@@ -50,35 +68,20 @@ def write(folder: Path, found: dict) -> Path:
             ax.legend(frameon=False, fontsize=8)
         shown += [_kept(folder, "recovery", "A record of a mesh twice as fine, fitted from 50 % off.", figure)]
     if any("series" in r for r in found.get("steady", {}).get("runs", [])):
-        figure = Figure(figsize=(8, 3.2), layout="constrained")
-        ax = figure.subplots()
-        for r in found["steady"]["runs"]:
-            ax.plot(*r["series"], label=f"h {r['h_mm']:g} mm", linewidth=1.2)
-        ax.axhline(found["steady"]["runs"][0]["expected_N_m"], color="k", linewidth=0.8, linestyle="--")
-        ax.set(xlabel="travel of the blade (mm)", ylabel="force per depth (N/m)")
-        ax.legend(frameon=False, fontsize=8)
+        runs = found["steady"]["runs"]
+        curves = [(f"h {r['h_mm']:g} mm", *r["series"]) for r in runs]
+        axes = "travel of the blade (mm)", "force per depth (N/m)"
+        figure = _curves(curves, *axes, level=runs[0]["expected_N_m"])
         shown += [_kept(folder, "force", "Force on the blade; dashed: closed form.", figure)]
     if "meshes" in found:
-        figure = Figure(figsize=(8, 3.2), layout="constrained")
-        ax = figure.subplots()
-        for r in found["meshes"]["runs"]:
-            at, force = (np.asarray(x) for x in r["series"])
-            ax.plot(
-                at[20:-19], np.convolve(force, np.ones(40) / 40, "valid"), label=f"h {r['h_mm']:g} mm", linewidth=1.2
-            )
-        ax.set(xlabel="edge of the blade (mm)", ylabel="force per depth, over 1 mm (N/m)")
-        ax.legend(frameon=False, fontsize=8)
+        curves = [(f"h {r['h_mm']:g} mm", *_means(*r["series"])) for r in found["meshes"]["runs"]]
+        figure = _curves(curves, "edge of the blade (mm)", "force per depth, over 1 mm (N/m)")
         shown += [_kept(folder, "entry", "A blade goes into an uncut front: three meshes, one law.", figure)]
     if "source" in found:
-        figure = Figure(figsize=(8, 3.2), layout="constrained")
-        ax = figure.subplots()
-        at, against, along = (np.asarray(x) for x in found["source"]["series"])
-        ax.plot(at, against, label="against the motion", linewidth=1.2)
-        ax.plot(at, along, label="along the blade", linewidth=1.2)
-        level = found["source"]["published_peak_N_m"]
-        ax.axhline(level, color="k", linewidth=0.8, linestyle="--", label="published strength times thickness")
-        ax.set(xlabel="edge of the blade (mm)", ylabel="force over depth (N/m)")
-        ax.legend(frameon=False, fontsize=8)
+        at, against, along = found["source"]["series"]
+        curves = [("against the motion", at, against), ("along the blade", at, along)]
+        level, said = found["source"]["published_peak_N_m"], "published strength times thickness"
+        figure = _curves(curves, "edge of the blade (mm)", "force over depth (N/m)", level, said)
         shown += [_kept(folder, "source", "The source's run with a toughness that its force implies.", figure)]
     page = render("cutting.html.j2", title="Is the cutting simulation right?", tables=tables, figures=shown)
     return write_text(folder / "report.html", page)

@@ -88,22 +88,24 @@ def probing_proposals(
         return []
     segments, y, sigma = series(planned, ready)
     runs = Runs({FINE: ready}, bench.runs.effects, segments, y, kept_samples(planned, segments))
-    told = runs.many([(bench.at(shared(r)), names, FINE) for r in (chosen, rival)])
+    predicted = runs.many([(bench.at(shared(r)), names, FINE) for r in (chosen, rival)])
     keys = [", ".join(dict.fromkeys(bench.candidates[k].name for k in r.keys)) for r in (chosen, rival)]
     out = []
     for text, r in words.items():
         own = [s for s in segments if s.recording == r.name]
-        both = [told_apart(told, own, sigma, i) for i in (0, 1)]
+        both = [told_apart(predicted, own, sigma, i) for i in (0, 1)]
         if np.all(np.isfinite(both)):
             out.append(Proposal(text, (keys[0], keys[1]), min(both), r))
     return sorted(out, key=lambda p: -p.discrimination)[:most]
 
 
-def told_apart(told: list[Float[np.ndarray, " N"]], own: list, sigma: Float[np.ndarray, " N"], truth: int) -> float:
+def told_apart(
+    predicted: list[Float[np.ndarray, " N"]], own: list, sigma: Float[np.ndarray, " N"], truth: int
+) -> float:
     """Chi-square that would speak against the other explanation, its stiffness scale set free."""
     d, scale = [], []
     for s in own:
-        a, b = told[truth][s.rows], told[1 - truth][s.rows]
+        a, b = predicted[truth][s.rows], predicted[1 - truth][s.rows]
         share = NUMERICAL[s.channel] * float(np.max(np.abs(a - a[0]), initial=0.0))
         noise = np.hypot(sigma[s.rows], share)
         d.append((a - b) / noise)

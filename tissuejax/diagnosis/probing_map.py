@@ -27,8 +27,10 @@ def pulled(model: Model, theta: Float[Array, " p"], setup: Setup, weights: dict[
 
     def along(logarithm: Array) -> Array:
         scene = setup.scene.put({"tissue.stiffness": jnp.exp(logarithm)})
-        told = simulated(model, dict(zip(model.declared, theta)), eqx.tree_at(lambda s: s.scene, setup, scene)).channels
-        seen = {name: jnp.where(w != 0, told[name], 0.0) for name, w in weights.items()}  # NaN where never seen
+        channels = simulated(
+            model, dict(zip(model.declared, theta)), eqx.tree_at(lambda s: s.scene, setup, scene)
+        ).channels
+        seen = {name: jnp.where(w != 0, channels[name], 0.0) for name, w in weights.items()}  # NaN where never seen
         return sum(jnp.sum(w * seen[name]) for name, w in weights.items())
 
     return jax.grad(along)(jnp.zeros(count, setup.scene.body.points.dtype))

@@ -148,8 +148,8 @@ class Runs:
         begin = self.rows[recording].start
         for s in self.segments:
             if s.recording == recording:
-                told = self.ready[FINE].unpadded(recording, s.channel, np.asarray(run.channels[s.channel]))
-                out[s.rows.start - begin : s.rows.stop - begin] = picked(told, s, self.finite)
+                reported = self.ready[FINE].unpadded(recording, s.channel, np.asarray(run.channels[s.channel]))
+                out[s.rows.start - begin : s.rows.stop - begin] = picked(reported, s, self.finite)
         return np.full_like(out, np.nan) if int(run.failed) >= 0 else out
 
     def _path(self, key: tuple) -> Path | None:
@@ -164,12 +164,12 @@ class Runs:
             self._known[key] = np.load(path)
         return key in self._known
 
-    def _keep(self, key: tuple, told: np.ndarray) -> None:
-        self._known[key] = told
+    def _keep(self, key: tuple, values: np.ndarray) -> None:
+        self._known[key] = values
         path = self._path(key)
         if path is not None:
             with replacing(path) as temporary, open(temporary, "wb") as file:
-                np.save(file, told)
+                np.save(file, values)
 
     def forget(self) -> None:
         """The diagnosis is finished: remove what was kept on disk."""

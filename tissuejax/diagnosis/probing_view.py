@@ -122,8 +122,8 @@ class ProbingView(Bench):
         names = (*self.fitted, *self.held_out)
         at = self.source.at({p: v for p, v in values.items() if p in self.free})
         if self.place is not None:
-            told = self.source.runs.many([(at, names, COARSE)])[0]
-            if self._change(told, self.place, names) < self.stays:
+            coarse_run = self.source.runs.many([(at, names, COARSE)])[0]
+            if self._change(coarse_run, self.place, names) < self.stays:
                 return self
         fine, slow, coarse = self.source.runs.many([(at, names, k) for k in (FINE, RETIMED, COARSE)])
         made = copy.copy(self)
@@ -162,10 +162,10 @@ class ProbingView(Bench):
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:
         """See `Bench.predict`; NaN where a simulation broke down."""
         wanted = tuple(recordings or (*self.fitted, *self.held_out))
-        told = self.source.runs.many([(self.source.at(values), wanted, COARSE)])[0]
+        coarse_run = self.source.runs.many([(self.source.at(values), wanted, COARSE)])[0]
         if self.place is not None:
-            told = self.place + self.source.calmed(told - self.place)
-        return (told + self.shift - self.origin) / self.unit
+            coarse_run = self.place + self.source.calmed(coarse_run - self.place)
+        return (coarse_run + self.shift - self.origin) / self.unit
 
     def rooted(self, values: Mapping[str, float]) -> "ProbingView":
         """See `Bench.rooted`."""
@@ -211,16 +211,16 @@ class ProbingView(Bench):
     def _nearby(self, path, at, wanted, reach) -> Float[np.ndarray, " N"] | None:
         if path not in self.source.slopes_taken.taken:
             return None
-        told = self.source.runs.many([(at, wanted, COARSE)])[0]
+        coarse_run = self.source.runs.many([(at, wanted, COARSE)])[0]
 
         def change(other: Float[np.ndarray, " N"]) -> float:
-            return self._change(told, other, wanted)
+            return self._change(coarse_run, other, wanted)
 
         return self.source.slopes_taken.find(path, at, self.free, wanted, change, reach)
 
     def _kept(self, path, at, wanted, column) -> Float[np.ndarray, " N"]:
-        told = self.source.runs.many([(at, wanted, COARSE)])[0]
-        self.source.slopes_taken.keep(path, Slope(dict(at), told, frozenset(wanted), column))
+        coarse_run = self.source.runs.many([(at, wanted, COARSE)])[0]
+        self.source.slopes_taken.keep(path, Slope(dict(at), coarse_run, frozenset(wanted), column))
         return column
 
     def _change(self, one, other, recordings) -> float:

@@ -157,7 +157,7 @@ class ProbingPredictor(Predictor):
     def _reported(self, name: str, run: Simulated) -> Recording:
         """A prediction as a recording: the checks of its simulation are attributes `numerics/...`."""
         measured = self.sample.recordings[name]
-        told = {
+        reported = {
             c: Channel(measured.channels[c].time, self.unpadded(name, c, v), measured.channels[c].unit)
             for c, v in run.channels.items()
         }
@@ -169,7 +169,7 @@ class ProbingPredictor(Predictor):
                 "numerics/penetration": deep,
                 "numerics/inertia": float(run.inertia),
             }
-        return Recording(name, measured.experiment, measured.inputs, told, {**measured.attributes, **checks})
+        return Recording(name, measured.experiment, measured.inputs, reported, {**measured.attributes, **checks})
 
     def unpadded(self, name: str, channel: str, values: Array) -> Array:
         """Values as simulated, cut to the samples (and markers) that recording and channel have."""
@@ -185,13 +185,13 @@ def predict_all(predictors: Sequence[ProbingPredictor], values: Values) -> list[
     """
     jobs = [p.job(values, name) for p in predictors for name in p.names]
     done = iter(workers.run_all(jobs, max((p.settings.processes for p in predictors), default=1)))
-    told = []
+    runs_reported = []
     for p in predictors:
         runs = {name: next(done) for name in p.names}
         for name, run in runs.items():
             p._refuse_failed(name, run)
-        told.append({name: p._reported(name, run) for name, run in runs.items()})
-    return told
+        runs_reported.append({name: p._reported(name, run) for name, run in runs.items()})
+    return runs_reported
 
 
 def make_ready(

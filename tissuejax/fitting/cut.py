@@ -105,8 +105,8 @@ def fit_cut(
     first = by_balance(sample, model, known, names, dict(start or {}))
     if by == "balance":
         return first
-    told = linear(first.predictor, first.values, known)
-    values = first.values | told | dict(start or {})
+    balanced = linear(first.predictor, first.values, known)
+    values = first.values | balanced | dict(start or {})
     thickness = min(p.thickness for p in first.predictor.paths_of.values())
 
     def parting(v):  # at half the blade's thickness; faces that hold beyond it press on the flats
@@ -121,7 +121,7 @@ def fit_cut(
     free = tuple(p for p in (STRENGTH, ENERGY, FRICTION) if p not in known)
     options = {"by": "simulation", "lenient": True, "blocks": means}
     made = predictor(plain, seen, names, settings=settings, start=values, **options)
-    tried = (values, values | told, parting(values), parting(values | told))
+    tried = (values, values | balanced, parting(values), parting(values | balanced))
     starts = sorted({tuple(v.values()): v for v in tried}.values(), key=partial(_misfit, made, free))
     best, runs = None, 0
     for values in starts:  # the next only where the better one to begin with led to no description of the record
@@ -269,5 +269,5 @@ def along(found: CutFit, knots: int = 18, roughness: float = 0.05) -> Float[np.n
                     bounds=[(-0.95, 10.0)] * knots)  # fmt: skip
     path = p.paths_of[name]
     at = np.linspace(0, path.length, knots)
-    told = at <= path.front.max()  # beyond, nothing was cut
-    return np.stack([at, values[ENERGY] * (1 + best.x)], 1)[told]
+    cut = at <= path.front.max()  # beyond, nothing was cut
+    return np.stack([at, values[ENERGY] * (1 + best.x)], 1)[cut]
