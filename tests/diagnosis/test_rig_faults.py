@@ -7,7 +7,7 @@ from tissuejax.diagnosis.diagnose import diagnose
 from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
-TRIED = ("clock-lag", "load-cell-bend", "viscoelasticity", "energy-form", "slack")
+TRIED = ("clock-lag", "load-cell-bend", "viscoelasticity", "energy-form", "slack", "drift")
 MU, NOISE, AREA = 800.0, 3.0, 4e-4
 QUICK = Effort(most=1, singles=5, reshaped=(1, 0, 0), starts=1)
 
@@ -38,6 +38,12 @@ def sample(recorded) -> Sample:
     return Sample("rig", made)
 
 
+def loaded_before(time, path):
+    """A cell's reading where the recorded zero was set at a load: the specimen was 3 % longer, or shorter, by then."""
+    x = path(time)
+    return elastic(x * (1.03 if x.max() > 1 else 0.97))
+
+
 def relaxed(time, path, g=0.3, tau=1.5):
     """Nominal stress of a Maxwell arm on the whole stress, by its exact recursion."""
     s, step = elastic(path(time)), time[1] - time[0]
@@ -57,6 +63,8 @@ def relaxed(time, path, g=0.3, tau=1.5):
             "effects.load-cell-bend.bend",
             0.9,
         ),
+        (loaded_before, "slack", "effects.slack.preload", 0.03),
+        (lambda t, path: elastic(path(t)) + 60.0, "drift", "effects.drift.offset", 60.0),
         (relaxed, "viscoelasticity", None, None),
         (  # stiffer by a fifth where it is pulled far, softer where it is pushed: no power, no exponential
             lambda t, path: elastic(path(t)) * (1 + 0.2 * np.tanh(9 * (path(t) - 1.08))),
@@ -65,7 +73,7 @@ def relaxed(time, path, g=0.3, tau=1.5):
             None,
         ),
     ],
-    ids=["clocks", "bent cell", "relaxation", "law of no form"],
+    ids=["clocks", "bent cell", "preload", "offset", "relaxation", "law of no form"],
 )
 def test_a_fault_of_the_rig_has_its_name_and_tissue_has_not(recorded, name, path, value):
     found = diagnose(sample(recorded), "neo-hookean", effects=TRIED, effort=QUICK, holdout=("last",))

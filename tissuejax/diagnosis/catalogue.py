@@ -281,6 +281,7 @@ def entries(sizes: Sizes) -> list[Entry]:
             (
                 Form("", ("gap",), {}),
                 Form("rounded", ("gap", "roundness"), {"roundness": (0.4, 1.0)}, nominated=False),
+                Form("loaded before", ("preload",), {}),
             ),
         ),
         "machine-compliance": (

@@ -19,7 +19,8 @@ from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.judge import log_prior
 from tissuejax.diagnosis.judgement.marginal import Blocked
-from tissuejax.diagnosis.judgement.weigh import ROUNDS, Scales, Weighed, squared, weigh
+from tissuejax.diagnosis.judgement.scales import Scales, squared
+from tissuejax.diagnosis.judgement.weigh import ROUNDS, Weighed, weigh
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.score import Score, complement, gain, trusted
 from tissuejax.diagnosis.starts import distinct, inside
@@ -92,7 +93,10 @@ class Exploration:
         return {n: names.count(n) for n in dict.fromkeys(names)}
 
     def worth(self, key: frozenset) -> float:
-        """Log posterior of a weighed set, up to a constant."""
+        """Log posterior of a weighed set, up to a constant: by all of its evidence, not the power that `judge` takes.
+
+        What is tried next follows from what describes the data best; how sure that makes of a name is another question.
+        """
         e = self.weighed[key].evidence
         if e.void or not math.isfinite(e.log_evidence):
             return -math.inf

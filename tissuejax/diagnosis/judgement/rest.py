@@ -11,7 +11,7 @@ from tissuejax.diagnosis.judgement.marginal import Linear, smooth
 from tissuejax.estimation.discrepancy import Part
 
 if TYPE_CHECKING:
-    from tissuejax.diagnosis.judgement.weigh import Scales
+    from tissuejax.diagnosis.judgement.scales import Scales
 
 
 def beyond(scales: "Scales", linear: Linear, smoothed: np.ndarray, scatter: np.ndarray) -> tuple[np.ndarray, ...]:

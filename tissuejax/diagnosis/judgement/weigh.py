@@ -7,22 +7,19 @@ and rates; an effect that only corrects what was noted says itself how far that 
 Positive shapes have normal priors of their logarithms. Fit and amplitudes of the discrepancy are found in turn.
 """
 
-import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import erfcx, log_ndtr
+from scipy.special import erfcx
 from scipy.stats import kurtosis
 
-from tissuejax.diagnosis.bench import Bench, Candidate, Free
-from tissuejax.diagnosis.judgement.blocks import Blocks
+from tissuejax.diagnosis.bench import Bench, Candidate
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import SetEvidence
 from tissuejax.diagnosis.judgement.marginal import (
-    Blocked,
     Linear,
     Marginal,
     Widths,
@@ -31,88 +28,15 @@ from tissuejax.diagnosis.judgement.marginal import (
 )
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
 from tissuejax.diagnosis.judgement.rest import beyond, numerical, rest, wobble
+from tissuejax.diagnosis.judgement.scales import Scales, log_prior, squared, with_priors
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.refit import Descent, Refit, refit
-from tissuejax.estimation.discrepancy import Discrepancy, Part
+from tissuejax.estimation.discrepancy import Part
 
 ROUNDS = 4  # of fit and amplitudes in turn
 SETTLED = 0.1  # nats: a round that gains less is the last
 FELT = 1e-6  # of the peak: what is no rounding, by its slope
 NOTHING = 1e-12  # of the peak: a change of the stress that is rounding
-
-
-@dataclass
-class Scales:
-    """What weighing needs of a sample beside the bench; the same for all sets.
-
-    Attributes:
-        bench: with all recordings fitted.
-        discrepancy: its parts, about any prediction.
-        families: of the parts, in order.
-        cut, blocked: block means and their noise.
-        values: the base fit, where the sizes of effects are taken.
-        reference: the stress that it predicts, block means, Pa.
-        peak: the largest stress, Pa.
-        size: against which the rest is measured, by block: the peak, or what noise makes of it (`Criteria.unseen`).
-    """
-
-    bench: Bench
-    discrepancy: Discrepancy
-    families: tuple[str, ...]
-    cut: Blocks
-    blocked: Blocked
-    values: Mapping[str, float]
-    reference: Float[np.ndarray, " M"]
-    peak: float
-    size: Float[np.ndarray, " M"] | None = None
-
-    def about(self, prediction: Float[np.ndarray, " N"], bench: Bench) -> tuple[Part, ...]:
-        """The discrepancy's parts beside a prediction (a long vector), and what the simulation has wrong there."""
-        parts = self.discrepancy.about(np.nan_to_num(self.cut.mean(prediction)))
-        if bench.numerical is None:
-            return parts
-        return (*parts, *(Part(name, "numerical", self.cut.mean(x)) for name, x in bench.numerical.items()))
-
-    def priors(self, criteria: Criteria, keys: Sequence[str] = ()) -> Widths:
-        """Prior of the amplitudes where the effects `keys` act.
-
-        A family whose widening has a name that these recordings can show is wide with that name alone: always in the
-        form that is nothing else, as likely as not beside another form of it. Any other may be wider without a name.
-        """
-        candidates = self.bench.candidates
-        named = {f: c.name for c in candidates.values() for f in c.widens}
-        wide = {f: w for key in keys for f, w in candidates[key].widens.items()}
-        acting = {candidates[key].name for key in keys}
-        free = np.array([f not in named for f in self.families])
-        partly = np.array([f not in wide and named.get(f) in acting for f in self.families])
-        width = np.array([wide.get(f, criteria.shares[f]) for f in self.families])
-        chance = free * criteria.unknown / max(int(np.sum(free)), 1) + 0.5 * partly
-        return Widths(width, chance, criteria.strange)
-
-    def widened(self, keys: Sequence[str]) -> frozenset[str]:
-        """Families of the discrepancy that are the business of the effects `keys`, in whatever form they act."""
-        candidates = self.bench.candidates
-        acting = {candidates[key].name for key in keys}
-        return frozenset(f for c in candidates.values() if c.name in acting for f in c.widens)
-
-    def effect_size(self, candidate: Candidate, values: Mapping[str, float], criteria: Criteria) -> dict[str, float]:
-        """For every amplitude of a candidate, the value that changes the stress as much as is usual, to first order.
-
-        Of an amplitude that does nothing at these shapes (fibres that nothing stretches) it is taken at those scanned;
-        of one that does nothing there either, its typical value: its prior has to be a density, whatever its width.
-        """
-        shapes = {p: values[p] for p in candidate.shapes if p in values}
-        out: dict[str, float] = {}
-        for setting in ({}, *candidate.grid):
-            left = [a for a in candidate.amplitudes if a not in out]
-            if not left:
-                break
-            columns = self.cut.mean(self.bench.columns(self.values, [({**shapes, **setting}, a) for a in left]))
-            for a, c in zip(left, columns.T, strict=True):  # over what it acts on: its own recording, say
-                moved, stress = squared(c), squared(self.reference[c != 0])
-                if 0 < moved < math.inf and stress > 0:
-                    out[a] = criteria.usual(candidate.rig) * math.sqrt(stress / moved)
-        return {a: out.get(a, self.bench.free[a].scale) for a in candidate.amplitudes}
 
 
 @dataclass(frozen=True)
@@ -136,47 +60,34 @@ class Weighed:
     settled: bool = True
 
 
-def with_priors(
-    scales: Scales, keys: Sequence[str], start: Mapping[str, float], criteria: Criteria, bench: Bench | None = None
-) -> tuple[Bench, dict[str, tuple[float, float]]]:
-    """The bench with priors on everything that the set frees, and those priors in the coordinates of a descent."""
-    bench, free, priors = bench or scales.bench, dict(scales.bench.free), {}
-    for key in keys:
-        c = bench.candidates[key]
-        sizes = scales.effect_size(c, {**bench.start, **start}, criteria)
-        middle = {p: [g[p] for g in c.grid if p in g] for p in c.shapes}
-        for path in c.amplitudes:  # of what only corrects what was noted, how far that may be wrong
-            priors[path] = free[path].prior or (bench.start[path], sizes[path])
-        for path in c.shapes:
-            f, scanned = free[path], middle[path] or [bench.start[path]]
-            if f.log:
-                logs = np.log(scanned)
-                priors[path] = (float(np.mean(logs)), float(np.hypot(criteria.shape, np.std(logs))))
-            else:
-                width = max(5 * f.scale, float(np.ptp(scanned)))
-                priors[path] = (float(np.mean(scanned)), width)
-    for path, prior in priors.items():
-        free[path] = replace(free[path], prior=prior)
-    ready = copy.copy(bench)
-    ready.free = free
-    return ready, priors
+@dataclass(frozen=True)
+class Round:
+    """What one turn of fit and amplitudes came to.
 
+    Attributes:
+        total: log evidence; value: of it, without `occam`, the mass over the discrepancy's amplitudes.
+        fit, v: the parameters and the squared amplitudes reached.
+        m: the density there; ahead: what a straight line would gain from there.
+        bound: which parameters of `descent` rest on a bound.
+        residual: block means, Pa, beside `parts`, on `bench`.
+        felt: by parameter, its largest slope, Pa per unit.
+        linear: the problem about the fit.
+    """
 
-def log_prior(f: Free, at: float, prior: tuple[float, float]) -> float:
-    """Log density of a normal prior inside the bounds of a parameter, in the coordinates of a descent."""
-    mean, std = prior
-    low, high = (math.log(f.lower), math.log(f.upper)) if f.log else (f.lower, f.upper)
-    a, b = (low - mean) / std, (high - mean) / std
-    if a > 0:
-        a, b = -b, -a
-    inside = log_ndtr(b) + math.log1p(-math.exp(min(log_ndtr(a) - log_ndtr(b), -1e-12)))
-    return -0.5 * ((at - mean) / std) ** 2 - math.log(std * math.sqrt(2 * math.pi)) - inside
-
-
-def squared(x: Float[np.ndarray, "..."]) -> float:
-    """Sum of squares; infinite, or not a number, where something is out of all bounds."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        return float(np.sum(x**2))
+    total: float
+    value: float
+    occam: float
+    fit: Refit
+    v: Float[np.ndarray, " K"]
+    m: Marginal
+    ahead: float
+    bound: np.ndarray
+    descent: Descent
+    residual: Float[np.ndarray, " M"]
+    parts: tuple[Part, ...]
+    bench: Bench
+    felt: Mapping[str, float]
+    linear: Linear
 
 
 def resting(slope: float, curvature: float) -> float:
@@ -257,10 +168,12 @@ def weigh(
         held = _on_bounds(scales, parts, v, residual, jac, x, descent, bound, weak, offset)
         occam = amplitude_mass(linear, parts, widths, scales.blocked, v, m)
         total = value + held + occam
-        if best is None or total > best[0] + 1e-6:
-            gained = math.inf if best is None else total - best[0]
+        if best is None or total > best.total + 1e-6:
+            gained = math.inf if best is None else total - best.total
             felt = dict(zip(descent.paths, np.max(np.abs(raw), axis=0), strict=True))
-            best = (total, value + held, occam, fit, v, m, ahead, bound, descent, residual, parts, bench, felt, linear)
+            best = Round(
+                total, value + held, occam, fit, v, m, ahead, bound, descent, residual, parts, bench, felt, linear
+            )
         else:
             break
         if gained < SETTLED or total + ahead < floor:
@@ -321,30 +234,32 @@ def _impossible(scales: Scales, keys: Sequence[str]) -> Weighed:
     return Weighed(low, fit, np.zeros(len(scales.families)), (), np.zeros(n))
 
 
-def _described(scales: Scales, keys: Sequence[str], best: tuple) -> Weighed:
-    total, value, occam, fit, v, m, ahead, bound, descent, residual, parts, bench, felt, linear = best
+def _described(scales: Scales, keys: Sequence[str], best: Round) -> Weighed:
+    fit, v, residual, parts, bench = best.fit, best.v, best.residual, best.parts, best.bench
     smoothed, scatter = rest(scales, parts, v, residual, scales.widened(keys))
-    left, open_still = beyond(scales, linear, smoothed, scatter)
+    left, open_still = beyond(scales, best.linear, smoothed, scatter)
     chi2 = float(np.sum((residual / scales.blocked.sigma) ** 2))
     before = scales.cut.mean(bench.y - scales.bench.predict(scales.values)) / scales.blocked.sigma
     n = len(residual)
     base = max(float(before @ before) - n, 1e-9)
     whitened = Whitening(bench, scales.cut, scales.blocked, parts, v).residual(fit.prediction, bench.fitted)
-    at_bound = tuple(p for p, b in zip(descent.paths, bound, strict=True) if b)
+    at_bound = tuple(p for p, b in zip(best.descent.paths, best.bound, strict=True) if b)
     void = any(
         _resting(bench.candidates[k], fit, bench, at_bound, v, scales.families)
-        or _idle(bench.candidates[k], fit, bench, scales.peak, felt)
+        or _idle(bench.candidates[k], fit, bench, scales.peak, best.felt)
         for k in keys
     )
-    own = 0.5 * float(np.linalg.slogdet(m.precision)[1]) if len(m.precision) else 0.0
-    density = m.value - ahead + own  # what is left of the evidence when the parameters' width is taken out of it
+    precision = best.m.precision
+    own = 0.5 * float(np.linalg.slogdet(precision)[1]) if len(precision) else 0.0
+    # what is left of the evidence when the parameters' width is taken out of it
+    density = best.m.value - best.ahead + own
     evidence = SetEvidence(
         keys=tuple(keys),
         names=tuple(dict.fromkeys(bench.candidates[k].name for k in keys)),
-        log_evidence=total,
+        log_evidence=best.total,
         fit=density,
-        parameters=value - density,
-        discrepancy=occam,
+        parameters=best.value - density,
+        discrepancy=best.occam,
         amplitudes={p.name: math.sqrt(x) for p, x in zip(parts, v, strict=True)},
         k=len(fit.values),
         at_bound=at_bound,
