@@ -5,6 +5,7 @@ several, all effects of the catalogue allowed. One file a sample under `results/
 
 tissuejax study fits/real-panel
 PANEL_ONLY=beef,rubber tissuejax study fits/real-panel      protocols of these keys alone
+PANEL_JUDGE=again tissuejax study fits/real-panel           judged again from the evidence that was kept (`runs/`)
 """
 
 import json
@@ -22,6 +23,9 @@ import panel_samples
 
 import tissuejax as tj
 from tissuejax.challenge.panel import answered, read_causes, summary
+from tissuejax.diagnosis.judgement.evidence import read_evidence, write_evidence
+from tissuejax.diagnosis.judgement.judge import judge
+from tissuejax.diagnosis.judgement.rejudge import verdict_of
 from tissuejax.progress import for_terminal
 from tissuejax.storage import write_json
 
@@ -46,22 +50,31 @@ KEPT = (
 )
 
 
-def file_of(folder: Path, name: str) -> Path:
-    """Where the result of a sample lies."""
-    return folder / "results" / f"{''.join(c if c.isalnum() else '-' for c in name)}.json"
+def file_of(folder: Path, name: str, kind: str = "results") -> Path:
+    """Where the result of a sample lies, or (in "runs") its evidence."""
+    return folder / kind / f"{''.join(c if c.isalnum() else '-' for c in name)}.json"
 
 
-def diagnosed(entry: panel_samples.Entry) -> dict:
-    """What the diagnosis says of one sample; a failure is an answer too."""
+def diagnosed(entry: panel_samples.Entry, evidence: Path) -> dict:
+    """What the diagnosis says of one sample, whose evidence is kept; a failure is an answer too."""
     begun = time.perf_counter()
     try:
         sample, held = panel_samples.build(entry)
-        found = tj.diagnose(sample, entry.energy, holdout=held, ogden_form=entry.ogden_form).as_dict()
+        answer = tj.diagnose(sample, entry.energy, holdout=held, ogden_form=entry.ogden_form)
+        write_evidence(answer.answered.evidence, evidence)
+        found = answer.as_dict()
         record = {k: found[k] for k in KEPT if k in found}
     except Exception as error:
         trace = traceback.format_exc().splitlines()[-6:]
         record = {"verdict": "failed", "effects": [], "error": f"{type(error).__name__}: {error}", "trace": trace}
     return {"id": entry.id, "energy": entry.energy, **record, "seconds": time.perf_counter() - begun}
+
+
+def judged_again(folder: Path, name: str) -> None:
+    """Replace what the judgement alone decides, where the evidence is at hand."""
+    path, evidence = file_of(folder, name), file_of(folder, name, "runs")
+    if path.exists() and evidence.exists():
+        write_json(path, json.loads(path.read_text()) | verdict_of(judge(read_evidence(evidence))))
 
 
 def in_turn(entries: list[panel_samples.Entry]) -> list[panel_samples.Entry]:
@@ -85,8 +98,11 @@ def main(folder: Path) -> str:
     with for_terminal().stage(f"diagnosing {len(left)} samples", len(left)) as stage:
         for entry in left:
             if not file_of(folder, entry.id).exists():
-                write_json(file_of(folder, entry.id), diagnosed(entry))
+                write_json(file_of(folder, entry.id), diagnosed(entry, file_of(folder, entry.id, "runs")))
             stage.advance(note=entry.id)
+    if os.environ.get("PANEL_JUDGE") == "again":
+        for entry in listed:
+            judged_again(folder, entry.id)
     answers = []
     for cause in causes:
         if (path := file_of(folder, cause.id)).exists():
