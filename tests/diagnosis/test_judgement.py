@@ -40,12 +40,20 @@ def test_no_other_verdict_has_a_larger_stated_probability(seed):
 
 
 def test_probabilities_by_hand():
-    """Two sets: odds are prior odds times the ratio of evidences to a power; slack has a third of 0.4, one form."""
-    j = judge(evidence(weighed([], 0.0), weighed(["slack"], math.log(1000.0))), Criteria(power=0.5))
+    """Odds are prior odds times the ratio of evidences to a power (of 100 data: a half); slack has a third of 0.4."""
+    j = judge(evidence(weighed([], 0.0), weighed(["slack"], math.log(1000.0))), Criteria(coarse=100.0))
     odds = math.sqrt(1000.0) * (0.4 / 3) / 0.4
     assert j.inclusion["slack"] == pytest.approx(odds / (1 + odds))
     assert j.kind is Kind.FOUND
     assert j.names == ("slack",)
+
+
+def test_more_data_of_a_model_that_is_nearly_right_count_less_each_but_never_less_in_all():
+    n = np.arange(1, 5000)
+    powers = np.array([Criteria().power(int(k)) for k in n])
+    assert powers[0] == pytest.approx(1.0, abs=0.01)
+    assert np.all(np.diff(powers) <= 0)
+    assert np.all(np.diff(n * powers) > 0)
 
 
 def test_forms_share_the_prior_of_their_name():
@@ -79,7 +87,7 @@ def test_equal_evidence_of_several_names_is_ambiguous():
 
 
 def test_a_name_that_two_sets_share_is_found_though_neither_set_is_sure():
-    pair = weighed(["relaxation", "slack"], math.log((0.4 / 3) / (0.15 / 3)) / Criteria().power)
+    pair = weighed(["relaxation", "slack"], math.log((0.4 / 3) / (0.15 / 3)) / Criteria().power(100))
     j = judge(evidence(weighed([], -50.0), weighed(["relaxation"], 0.0), pair))
     assert j.inclusion["relaxation"] == pytest.approx(1.0)
     assert j.inclusion["slack"] == pytest.approx(0.5, abs=1e-6)

@@ -1,6 +1,6 @@
 """From evidence to a verdict, by the rules of probability alone: the same evidence, the same answer, in milliseconds.
 
-The posterior of a set is its prior times its evidence, to a power (`Criteria.power`), over the sum of all that were
+The posterior of a set is its prior times its evidence, to a power (`Criteria.coarse`), over the sum of all that were
 weighed (what was never tried has none, and that is said). Effects are named that are likelier present than not. The
 five answers divide what may be true:
 
@@ -88,8 +88,9 @@ def judge(evidence: Evidence, criteria: Criteria | None = None) -> Judgement:
     criteria = criteria or Criteria()
     usable = [s for s in evidence.sets if not s.void and math.isfinite(s.log_evidence)]
     groups: dict[frozenset, list[tuple[float, SetEvidence]]] = {}
+    power = criteria.power(max(s.n for s in usable))
     for s in usable:
-        weight = criteria.power * s.log_evidence + log_prior(s, evidence.forms, criteria)
+        weight = power * s.log_evidence + log_prior(s, evidence.forms, criteria)
         groups.setdefault(frozenset(s.names), []).append((weight, s))
     weights = {k: float(logsumexp([w for w, _ in rows])) for k, rows in groups.items()}
     whole = float(logsumexp(list(weights.values())))
