@@ -236,3 +236,16 @@ def test_the_loading_state_knows_the_way_and_not_the_rate():
     assert h[199, 2] == pytest.approx(1 - math.exp(-(0.5 - 2 * BAND) / 0.3), abs=0.02)
     trembling = 0.5 + 0.4 * BAND * np.sin(np.arange(300.0))
     assert not loading_states(np.concatenate([[0.0, 1.0], trembling]))[2:, 0].max() > 0
+
+
+def test_what_specimens_share_does_not_carry_how_they_differ():
+    """One law, pulled alike, one specimen twice as stiff: no shared part is larger in the stiffer one, a gain is."""
+    x = np.linspace(0.0, 0.3, 20)
+    alike = {"mode": "extension", "time": x, "strain": np.stack([x, -x / 2], 1), "states": loading_states(x)}
+    soft, stiff = Series("soft", peak=100.0, **alike), Series("stiff", peak=200.0, **alike)
+    parts = discrepancy([soft, stiff], np.ones(40)).about(np.tile(400 * x, 2))
+    for p in parts:
+        if p.family in ("law", "hysteresis"):
+            np.testing.assert_allclose(p.factor[:20], p.factor[20:], rtol=1e-9, atol=1e-12)
+    own = next(p for p in parts if p.family == "gain")
+    assert not np.any(own.factor[:20] * own.factor[20:])

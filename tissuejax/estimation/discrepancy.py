@@ -13,8 +13,9 @@ the model of Kennedy and O'Hagan (2001), with the parts that rests of material t
 | slow | exponential in time (0.05, 0.25 and 1.5 of the recording), of each recording's own |
 | white | what scatters from sample to sample beyond the stated noise |
 
-Amplitudes a_k are shares of the stress that the model predicts (law, gain) or of its peak in the recording. Of what the
-model predicts: about the stress of another model a gain could bring that model's answer in.
+Amplitudes a_k are shares of the stress that the model predicts (law, gain), of its peak in the recording (hysteresis),
+or of the measured peak there (slow, white). Of what the model predicts: about the stress of another model a gain could
+bring that model's answer in, and about the measured peak a part that all specimens share would carry how they differ.
 
 Source: Kennedy and O'Hagan 2001, J. R. Statist. Soc. B 63; the loading state: Krasnosel'skii and Pokrovskii 1989.
 """
@@ -112,12 +113,14 @@ class Discrepancy:
         laws: factors of the laws about a stress of one, by name.
         belongs: a column for every recording, one where a row belongs to it.
         own: factors of a law of each series' own, about a stress of one.
+        turning: factors of hysteresis about a peak of one, by name.
         fixed: the parts that don't depend on the prediction.
     """
 
     laws: tuple[tuple[str, Float[np.ndarray, "N r"]], ...]
     belongs: Float[np.ndarray, "N R"]
     own: Float[np.ndarray, "N q"]
+    turning: tuple[tuple[str, Float[np.ndarray, "N r"]], ...]
     fixed: tuple[Part, ...]
 
     def about(self, prediction: Float[np.ndarray, " N"]) -> tuple[Part, ...]:
@@ -125,7 +128,9 @@ class Discrepancy:
         stress = prediction[:, None]
         laws = tuple(Part(name, "law", stress * factor) for name, factor in self.laws)
         several = (Part("gain", "gain", stress * self.belongs), Part("own law", "gain", stress * self.own))
-        return (*laws, *several, *self.fixed)
+        peak = self.belongs @ np.max(np.abs(stress) * self.belongs, axis=0)
+        turning = (Part(name, "hysteresis", peak[:, None] * factor) for name, factor in self.turning)
+        return (*laws, *several, *turning, *self.fixed)
 
 
 def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"]) -> Discrepancy:
@@ -135,7 +140,6 @@ def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"]) -> Dis
         sigma: noise of each entry, Pa; entries that are means of more samples scatter less.
     """
     of = np.repeat(np.arange(len(series)), [len(s.time) for s in series])
-    peak = np.array([s.peak for s in series])[of]
     states = np.concatenate([s.states for s in series])
     modes = [np.flatnonzero([s.mode == m for s in series]) for m in dict.fromkeys(s.mode for s in series)]
 
@@ -151,8 +155,8 @@ def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"]) -> Dis
 
     recordings = list(dict.fromkeys(s.recording for s in series))
     belongs = np.array([recordings.index(s.recording) for s in series])[of]
-    near = peak[:, None] * shared(ALIKE)
-    out = [Part(f"hysteresis, {shape}", "hysteresis", near * states[:, i, None]) for i, shape in enumerate(STATES)]
+    near, out = shared(ALIKE), []
+    turning = tuple((f"hysteresis, {shape}", near * states[:, i, None]) for i, shape in enumerate(STATES))
     for name, time in SLOW.items():
         blocks = []
         for s in series:
@@ -166,4 +170,4 @@ def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"]) -> Dis
     out.append(Part("white", "white", within=tuple(scatter)))
     laws = tuple((name, shared(length)) for name, length in LAW.items())
     own = block_diag(*(smooth_factor(s.strain, LAW["law"]) for s in series))
-    return Discrepancy(laws, (belongs[:, None] == np.arange(len(recordings))).astype(float), own, tuple(out))
+    return Discrepancy(laws, (belongs[:, None] == np.arange(len(recordings))).astype(float), own, turning, tuple(out))
