@@ -21,8 +21,11 @@ NOUNS = {
     "InputError": "errors",
     "Model": "model",
     "NotConverged": "errors",
+    "Objective": "fitting.options",
     "Recording": "recordings.recording",
     "Sample": "recordings.recording",
+    "Search": "fitting.options",
+    "Unknowns": "fitting.options",
 }
 
 __all__ = [*VERBS, *NOUNS, "__version__"]

@@ -9,7 +9,7 @@ itself.
 """
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ from tissuejax.energies import catalogue as names
 from tissuejax.energies.energy import Energy
 from tissuejax.experiments.predictor import predictor
 from tissuejax.fitting.least_squares import fit as fit_problem
+from tissuejax.fitting.options import Objective, Search, Unknowns
 from tissuejax.fitting.probed import fit_probed
 from tissuejax.fitting.result import Fit
 from tissuejax.fitting.setup import problem, split
@@ -77,21 +78,10 @@ def fit(
     effects: Sequence[str] = (),
     only: Sequence[str] = (),
     holdout: Sequence[str] = (),
-    free: Sequence[str] | None = None,
-    fix: Mapping[str, float] | None = None,
-    start: Mapping[str, float] | None = None,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    priors: Mapping[str, tuple[float, float]] | None = None,
-    weights: str | Mapping[str, float] = "auto",
-    channels: Sequence[str] = (),
-    loss: str = "squares",
-    stable: bool = False,
-    method: str = "levenberg-marquardt",
-    multistart: int = 4,
-    seed: int = 0,
-    max_steps: int = 200,
+    unknowns: Unknowns | None = None,
+    objective: Objective | None = None,
+    search: Search | None = None,
     progress: Progress | None = None,
-    checkpoint: Path | None = None,
 ) -> Fit:
     """Estimate the parameters of a strain energy (and effects) from the recordings of a sample.
 
@@ -99,14 +89,10 @@ def fit(
         data: a recording file (HDF5), a side file (TOML) of tables, or a Sample.
         energy: a name, an Energy or a whole Model; see `material` for ogden_form, volumetric, effects.
         only, holdout: recordings to fit, and to predict only.
-        free, fix, start, bounds, priors: by dotted path, SI; see `fitting.setup.problem`.
-        weights, channels, loss: what a unit of misfit means.
-        stable: keep the energy stable (Drucker) over the recorded stretches.
-        method: "levenberg-marquardt", "adam" or "lbfgs"; for a probing also "stress-curve", the source's iteration.
-        multistart, seed: number of starts and seed of those after the first.
-        max_steps: evaluations for each start.
+        unknowns: what is estimated, from where, within which limits.
+        objective: what a unit of misfit means.
+        search: method, number of starts and steps.
         progress: told after every accepted step.
-        checkpoint: for probings, a file that keeps the last iterate; a killed fit goes on from there.
 
     Probings are fitted by `fitting.probed.fit_probed` (forward-mode least squares): from one start, whatever
     `multistart` says, with a volumetric energy K/2 (J-1)^2 if none is named.
@@ -125,34 +111,25 @@ def fit(
     probing = all(sample.recordings[name].experiment == "probing" for name in fitted)
     if probing and energy.volumetric is None:
         energy = Model(energy.energy, names.volumetric("quadratic"), energy.effects)
-    posed = problem(
-        predictor(energy, sample, fitted),
-        free=tuple(free) if free is not None else None,
-        fix=fix,
-        start=start,
-        bounds=bounds,
-        priors=priors,
-        weights=weights,
-        channels=tuple(channels),
-        loss=loss,
-        stable=stable,
-    )
+    search, start = search or Search(), (unknowns or Unknowns()).start
+    posed = problem(predictor(energy, sample, fitted), unknowns, objective)
     with (progress or Silent()).stage(f"fitting {energy.energy.name} to {sample.name}", None) as stage:
-        if method == STRESS_CURVE:
+        if search.method == STRESS_CURVE:
             found = fit_stress_curve(posed, holdout=held)
         elif probing:  # each run is a simulation: one start, few runs, errors that include the numerical one
             found = fit_probed(
-                posed, holdout=held, max_steps=min(max_steps, 12), progress=progress, checkpoint=checkpoint
+                posed,
+                holdout=held,
+                max_steps=min(search.max_steps, 12),
+                progress=progress,
+                checkpoint=search.checkpoint,
             ).fit
         else:
             found = fit_problem(
                 posed,
                 start=dict(posed.start) if start else None,
-                multistart=multistart,
-                method=method,
+                search=search,
                 holdout=held,
-                seed=seed,
-                max_steps=max_steps,
                 on_accept=lambda n, chi2, values: stage.advance(note=f"chi-square {chi2:.4g}"),
             )
     found.warnings.extend(f"Look at the data: {sentence}." for sentence in slips(sample, (*fitted, *held)))

@@ -16,6 +16,12 @@ from tissuejax.report.page import png
 from tissuejax.report.plot import FAINT, INK, SERIES, grid
 from tissuejax.storage import write_bytes, write_json, write_text
 
+WIDE = tj.Search(multistart=6)
+
+UNIFORM = tj.Objective(weights="uniform")
+
+ONCE = tj.Search(multistart=1)
+
 PUBLISHED = {  # standard error of fit for EF10, kPa (Dawood et al. 2026)
     "neo-hookean": 13.04,
     "reduced-polynomial-2": 2.94,
@@ -59,9 +65,22 @@ def published_errors(folder: Path) -> dict:
     ef10 = tj.read(f"{folder / 'ecoflex.toml'}#EF10_0T")
     mean, rows = mean_curve(ef10), {}
     for energy, theirs in PUBLISHED.items():
-        found = tj.fit(mean, energy, ogden_form=form_of(energy), weights="uniform", multistart=6)
+        found = tj.fit(
+            mean,
+            energy,
+            ogden_form=form_of(energy),
+            objective=UNIFORM,
+            search=WIDE,
+        )
         single = [
-            standard_error(tj.fit(Sample(name, {name: r}), energy, ogden_form=form_of(energy), weights="uniform"))
+            standard_error(
+                tj.fit(
+                    Sample(name, {name: r}),
+                    energy,
+                    ogden_form=form_of(energy),
+                    objective=UNIFORM,
+                )
+            )
             for name, r in ef10.recordings.items()
         ]
         rows[energy] = {
@@ -80,7 +99,7 @@ def every_test(folder: Path) -> dict:
     samples, rows = read_all(folder / "ecoflex-each.toml"), {}
     with for_terminal().stage(f"{ALL} on {len(samples)} tests", len(samples)) as stage:
         for name, sample in samples.items():
-            found = tj.fit(sample, ALL, weights="uniform", multistart=1)
+            found = tj.fit(sample, ALL, objective=UNIFORM, search=ONCE)
             rows[name] = {
                 "shear_modulus_Pa": 2 * found.values["energy.C10"],
                 "standard_error_kPa": standard_error(found),

@@ -14,6 +14,10 @@ from tissuejax.report.plot import grid
 from tissuejax.report.series import curves
 from tissuejax.storage import write_bytes, write_json
 
+WIDE = tj.Search(multistart=6)
+
+UNIFORM = tj.Objective(weights="uniform")
+
 REGIONS = {"CX": "cortex", "CR": "corona radiata", "BG": "basal ganglia", "CC": "corpus callosum"}
 MODES = ("tension-compression", "shear")
 FORM = "2mu/alpha^2"
@@ -42,7 +46,13 @@ def main(folder: Path) -> str:
         sample = tj.read(f"{folder / 'brain.toml'}#{region}")
         entry = {"region": words, "measured_asymmetry": asymmetry(sample), "joint": {}, "one_mode": {}}
         for energy, form in ENERGIES:
-            both = tj.fit(sample, energy, ogden_form=form, weights="uniform", multistart=6)
+            both = tj.fit(
+                sample,
+                energy,
+                ogden_form=form,
+                objective=UNIFORM,
+                search=WIDE,
+            )
             entry["joint"][energy] = {
                 "rmse_Pa": errors(both.channels),
                 "values": {path: [both.values[path], both.std[path]] for path in both.free},
@@ -50,7 +60,14 @@ def main(folder: Path) -> str:
             }
             for mode in MODES:
                 held = next(m for m in MODES if m != mode)
-                found = tj.fit(sample, energy, ogden_form=form, holdout=[held], weights="uniform", multistart=6)
+                found = tj.fit(
+                    sample,
+                    energy,
+                    ogden_form=form,
+                    holdout=[held],
+                    objective=UNIFORM,
+                    search=WIDE,
+                )
                 entry["one_mode"].setdefault(energy, {})[f"{mode} fitted, {held} predicted"] = {
                     "fitted_Pa": errors(found.channels)[mode],
                     "predicted_Pa": errors(found.holdout)[held],

@@ -15,6 +15,7 @@ from tissuejax.energies.published import published
 from tissuejax.errors import UnstableSimulation
 from tissuejax.experiments.predictor import predictor
 from tissuejax.experiments.probing_settings import ProbingSettings
+from tissuejax.fitting.options import Unknowns
 from tissuejax.fitting.setup import problem
 from tissuejax.fitting.stability import recorded_stability
 from tissuejax.fitting.stress_curve import errors, stress_curve
@@ -112,7 +113,7 @@ def by_gradients(p, name: str, start: dict, most: int = 4) -> tuple[dict, list[d
     """
     runs = [run_of(p, name, start, told := p.predict(start)[name], "start")]
     values = scaled(p, name, start, told)
-    posed = problem(p, start=values, free=tuple(k for k in start if k.startswith("energy.")))
+    posed = problem(p, unknowns=Unknowns(start=values, free=tuple(k for k in start if k.startswith("energy."))))
     moduli = np.array([k.startswith("energy.mu") for k in posed.free])
     x, step, best = posed.vector(values), None, None
     while len(runs) < most:

@@ -25,6 +25,8 @@ from tissuejax.fitting.target import Target
 from tissuejax.recordings.recording import Channel, Recording, Sample
 from tissuejax.storage import write_figure, write_json
 
+ONCE = tj.Search(multistart=1)
+
 DATA_SETS, DRAWS, BINS, SIGMA, SEED = 200, 99, 10, 40.0, 11
 STRETCH = np.linspace(0.75, 1.3, 24)
 PRIOR = {"energy.mu": (1500.0, 350.0), "energy.b": (2.0, 0.7)}
@@ -56,7 +58,7 @@ def truths(rng: np.random.Generator) -> np.ndarray:
 def posterior_ranks(rng: np.random.Generator) -> tuple[dict, dict, float]:
     """Ranks and covered truths of Laplace and NUTS, and the largest k-hat; the noise is recorded."""
     means = np.array([m for m, _ in PRIOR.values()])
-    base = tj.fit(data(stress(*means)), "demiray", multistart=1, priors=PRIOR).problem
+    base = tj.fit(data(stress(*means)), "demiray", search=ONCE, unknowns=tj.Unknowns(priors=PRIOR)).problem
     target = Target(base)
     run = nuts_runner(target, 4 * DRAWS, 1, 200)
     ranks, covered, khat = {"Laplace": [], "NUTS": []}, {"Laplace": [], "NUTS": []}, []
@@ -82,14 +84,14 @@ def posterior_ranks(rng: np.random.Generator) -> tuple[dict, dict, float]:
 def counted(rng: np.random.Generator, every: int, std: float | None) -> dict[str, list]:
     """Truths in intervals by standard error and by profile; curve and newly measured values in the band."""
     means = np.array([m for m, _ in PRIOR.values()])
-    base = tj.fit(data(stress(*means), every, std), "demiray", multistart=1).problem
+    base = tj.fit(data(stress(*means), every, std), "demiray", search=ONCE).problem
     found: dict[str, list] = {"standard error": [], "profile": [], "band of new values": []}
     for _ in range(DATA_SETS):
         truth = truths(rng)
         clean = stress(*truth)
         measured = clean + SIGMA * rng.normal(size=len(STRETCH))
         posed = replace(base, predictor=eqx.tree_at(lambda p: p.sample, base.predictor, data(measured, every, std)))
-        best: Fit = fit(posed, start=dict(base.start) | dict(zip(base.free, means)), multistart=1)
+        best: Fit = fit(posed, start=dict(base.start) | dict(zip(base.free, means)), search=ONCE)
         inside = [low < x < high for x, (low, high) in zip(truth, best.intervals.values(), strict=True)]
         found["standard error"].append(inside)
         ends = [profile(best, path, points=4).interval for path in best.free]

@@ -29,7 +29,15 @@ def fitted(sample, terms: int, names: tuple[str, ...], held: tuple[str, ...]):
     made = model(terms)
     times = {path: p.default for path, p in made.parameters.items() if ".tau" in path}
     shares = {path: 0.6 / terms for path in made.parameters if ".g" in path}
-    return tj.fit(sample, made, only=names, holdout=held, fix=times, start=shares, weights="relative", multistart=3)
+    return tj.fit(
+        sample,
+        made,
+        only=names,
+        holdout=held,
+        unknowns=tj.Unknowns(fix=times, start=shares),
+        objective=tj.Objective(weights="relative"),
+        search=tj.Search(multistart=3),
+    )
 
 
 def relative(scores, peaks) -> dict[str, float]:

@@ -23,6 +23,8 @@ from tissuejax.recordings.files import read_all
 from tissuejax.report.population_page import write_population
 from tissuejax.storage import write_json
 
+ONCE = tj.Search(multistart=1)
+
 DRAWS, WARMUP, CHAINS, PARTS, SEED = 400, 400, 2, 5, 5
 RELAXATION = ((0.05, 0.65), (0.5, 0.21), (6.0, 0.07))  # s, share: median of five tests, fits/beef/README.md
 SHARES = (0.25, 0.5, 0.75, 1.0)  # of a test's largest strain, where its stress is predicted
@@ -52,7 +54,11 @@ def separate(told: dict) -> dict[str, Fit]:
         for name, sample in samples.items():
             with suppress(TissueError):
                 found[name] = tj.fit(
-                    sample, told["energy"], effects=told.get("effects", ()), fix=told.get("fix"), multistart=1
+                    sample,
+                    told["energy"],
+                    effects=told.get("effects", ()),
+                    unknowns=tj.Unknowns(fix=told.get("fix")),
+                    search=ONCE,
                 )
             stage.advance(note=name)
     return found

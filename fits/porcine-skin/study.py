@@ -3,16 +3,21 @@
 tissuejax study fits/porcine-skin
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import tissuejax as tj
 from tissuejax.storage import write_json
+
+ONCE = tj.Search(multistart=1)
 
 PATHS = ("off_x", "off_y", "equibiaxial", "strip_x", "strip_y")
 ISOTROPIC = ("neo-hookean", "reduced-polynomial-3", "demiray")
 FIBRE = ("neo-hookean+fibre", "demiray+fibre")
 START = {"energy.angle": 1.3}  # a start along an axis of the test has no slope to leave it by
 BOUNDS = {"energy.angle": (-0.2, 1.77)}  # from x to y: the tests can't tell an angle from its mirror image
+
+UNIFORM = tj.Objective(weights="uniform")
 
 
 def errors(scores) -> dict[str, float]:
@@ -25,10 +30,9 @@ def main(folder: Path) -> str:
     sample = tj.read(folder / "skin.toml")
     record = {"joint": {}, "predicted": {}}
     for energy in (*ISOTROPIC, *FIBRE):
-        options = {"weights": "uniform", "multistart": 4}
-        if "+" in energy:
-            options |= {"bounds": BOUNDS, "start": START}
-        found = tj.fit(sample, energy, **options)
+        fibre = "+" in energy
+        unknowns = tj.Unknowns(bounds=BOUNDS, start=START) if fibre else tj.Unknowns()
+        found = tj.fit(sample, energy, unknowns=unknowns, objective=UNIFORM)
         n = sum(s.n for s in found.channels.values())
         record["joint"][energy] = {
             "rmse_kPa": errors(found.channels),
@@ -38,8 +42,9 @@ def main(folder: Path) -> str:
         }
         tj.write(found, folder / "figures" / energy.replace("+", "-"))
         for path in PATHS:
-            near = options | {"multistart": 1, "start": {p: found.values[p] for p in found.free}}
-            other = tj.fit(sample, energy, holdout=[path], **near)
+            near = replace(unknowns, start={p: found.values[p] for p in found.free})
+            once = ONCE
+            other = tj.fit(sample, energy, holdout=[path], unknowns=near, objective=UNIFORM, search=once)
             record["predicted"].setdefault(energy, {})[path] = errors(other.holdout)[path]
     write_json(folder / "result.json", record)
     shown = ", ".join(f"{e} {r['rmse_all_kPa']:.1f}" for e, r in record["joint"].items())

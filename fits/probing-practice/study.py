@@ -10,6 +10,7 @@ from pathlib import Path
 import tissuejax as tj
 from tissuejax.errors import InputError
 from tissuejax.experiments.predictor import predictor
+from tissuejax.fitting.options import Unknowns
 from tissuejax.fitting.probed import fit_probed
 from tissuejax.fitting.setup import problem
 from tissuejax.progress import for_terminal
@@ -26,7 +27,7 @@ def main(folder: Path) -> str:
         raise InputError(f"{practice / 'p01.h5'} is not here: set TISSUEJAX_SHARED to the folder that holds practice/")
     sample = tj.read(practice / "p01.h5")
     model = material("reduced-polynomial-2", volumetric="quadratic")
-    posed = problem(predictor(model, sample, ["r1", "r2"]), start=START)
+    posed = problem(predictor(model, sample, ["r1", "r2"]), unknowns=Unknowns(start=START))
     found = fit_probed(posed, holdout=("r3",), checkpoint=folder / "checkpoint.json", progress=for_terminal())
     write_json(folder / "result.json", found.record() | against_key(found, practice / "keys-probing.json"))
     said = [

@@ -34,7 +34,7 @@ def main(folder: Path) -> str:
     for source in SOURCES:
         sample = tj.read(f"{folder / 'rubber.toml'}#{source}")
         for energy, form in ENERGIES:
-            found = tj.fit(sample, energy, ogden_form=form, multistart=6)
+            found = tj.fit(sample, energy, ogden_form=form, search=tj.Search(multistart=6))
             sse = sum(s.n * (s.rmse / 1e6) ** 2 for s in found.channels.values())
             entry = {
                 "sse_MPa2": sse,
@@ -58,7 +58,7 @@ def main(folder: Path) -> str:
 def predicted(sample, energy: str, form: str | None, mode: str) -> float | None:
     """RMSE (MPa) of one mode predicted from a fit of the other two."""
     try:
-        found = tj.fit(sample, energy, ogden_form=form, holdout=[mode], multistart=6)
+        found = tj.fit(sample, energy, ogden_form=form, holdout=[mode], search=tj.Search(multistart=6))
     except TissueError:
         return None
     return rmse(found.holdout)[mode]

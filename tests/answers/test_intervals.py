@@ -16,6 +16,8 @@ from tissuejax.fitting.profile import profile
 from tissuejax.recordings.hdf5_writing import write
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
+ONCE = tj.Search(multistart=1)
+
 STRETCH = np.linspace(0.8, 1.35, 40)
 X = STRETCH - STRETCH**-2  # P = mu X, and P = 2 C10 X + 2 C01 X / l
 SIGMA = 60.0
@@ -35,7 +37,7 @@ def sample(scale=1.0):
 
 @pytest.fixture(scope="module")
 def found():
-    return tj.fit(sample(0.95), "mooney-rivlin", multistart=1)
+    return tj.fit(sample(0.95), "mooney-rivlin", search=ONCE)
 
 
 def covariance():
@@ -75,9 +77,14 @@ def test_the_posterior_of_a_linear_law_is_normal(found, method):
 def test_a_bound_cuts_the_posterior():
     from tissuejax.fitting.posterior import laplace, target_of
 
-    found = tj.fit(sample(0.95), "neo-hookean", multistart=1)
+    found = tj.fit(sample(0.95), "neo-hookean", search=ONCE)
     mu, s = found.values["energy.mu"], SIGMA / np.linalg.norm(X)
-    cut = tj.fit(sample(0.95), "neo-hookean", multistart=1, bounds={"energy.mu": (mu - s, 5000.0)})
+    cut = tj.fit(
+        sample(0.95),
+        "neo-hookean",
+        search=ONCE,
+        unknowns=tj.Unknowns(bounds={"energy.mu": (mu - s, 5000.0)}),
+    )
     drawn = laplace(target_of(cut), np.array([cut.values["energy.mu"]]), 8000)
     low, high = drawn.interval()["energy.mu"]
     base = norm.cdf(-1)
@@ -89,26 +96,36 @@ def test_the_evidence_of_a_linear_law_is_the_integral():
     from tissuejax.fitting.evidence import evidence
     from tissuejax.fitting.target import Target
 
-    found = tj.fit(sample(0.95), "neo-hookean", multistart=1, bounds={"energy.mu": (200.0, 2000.0)})
+    found = tj.fit(
+        sample(0.95),
+        "neo-hookean",
+        search=ONCE,
+        unknowns=tj.Unknowns(bounds={"energy.mu": (200.0, 2000.0)}),
+    )
     s = SIGMA / np.linalg.norm(X)
     best = -0.5 * found.chi2 - 40 * math.log(SIGMA * math.sqrt(2 * math.pi))
     by_hand = best + math.log(s * math.sqrt(2 * math.pi) / 1800.0)
     told = evidence(Target(found.problem), 400, 3)
     assert told.log_evidence == pytest.approx(by_hand, abs=0.15)
-    prior = tj.fit(sample(0.95), "neo-hookean", multistart=1, priors={"energy.mu": (900.0, 150.0)})
+    prior = tj.fit(
+        sample(0.95),
+        "neo-hookean",
+        search=ONCE,
+        unknowns=tj.Unknowns(priors={"energy.mu": (900.0, 150.0)}),
+    )
     data = sample(0.95).recordings["pull"].channels["nominal_stress"].values
     cov = SIGMA**2 * np.eye(40) + 150.0**2 * np.outer(X, X)
     r = np.asarray(data) - 900 * X
     by_hand = -0.5 * (r @ np.linalg.solve(cov, r) + np.linalg.slogdet(cov)[1] + 40 * math.log(2 * math.pi))
     assert evidence(Target(prior.problem), 400, 3).log_evidence == pytest.approx(by_hand, abs=0.15)
     with pytest.raises(InputError, match="proper priors"):
-        evidence(Target(tj.fit(sample(), "neo-hookean", multistart=1).problem))
+        evidence(Target(tj.fit(sample(), "neo-hookean", search=ONCE).problem))
 
 
 def test_a_misfit_widens_the_posterior_as_it_widens_the_errors():
     from tissuejax.fitting.posterior import target_of
 
-    found = tj.fit(sample(3.0), "neo-hookean", multistart=1)
+    found = tj.fit(sample(3.0), "neo-hookean", search=ONCE)
     assert found.chi2_per_dof > 5
     target = target_of(found)
     mode = np.array([found.values["energy.mu"]])

@@ -17,6 +17,8 @@ from tissuejax.report.fit_overlay import FitOverlay
 from tissuejax.report.fit_tables import write_curves, write_latex
 from tissuejax.report.scales import with_std
 
+ONCE = tj.Search(multistart=1)
+
 STRETCH = np.linspace(1.0, 1.4, 60)
 
 
@@ -30,7 +32,7 @@ def sample(noise, mu=3000.0, seed=1, stated=None):
 
 @pytest.fixture(scope="module")
 def found():
-    return tj.fit(sample(10.0), "neo-hookean", multistart=1)
+    return tj.fit(sample(10.0), "neo-hookean", search=ONCE)
 
 
 def test_the_band_is_that_of_a_line_through_the_origin(found):
@@ -48,7 +50,7 @@ def test_where_the_noise_was_not_recorded_the_band_is_that_of_student():
     stress = np.asarray(few.channels["nominal_stress"].values)[::10]
     made = recording("pull", "uniaxial", time, stretch)
     pull = Recording("pull", "uniaxial", made.inputs, {"nominal_stress": Channel(time, stress, "Pa")}, {})
-    found = tj.fit(Sample("s", {"pull": pull}), "neo-hookean", multistart=1)
+    found = tj.fit(Sample("s", {"pull": pull}), "neo-hookean", search=ONCE)
     x = stretch - stretch**-2
     s = np.sqrt(np.sum((stress - found.values["energy.mu"] * x) ** 2) / 5)
     by_hand = student.ppf(0.975, 5) * s * np.sqrt(1 + x**2 / np.sum(x**2))
@@ -63,21 +65,26 @@ def test_the_band_from_the_fits_own_jacobian_is_the_same(found):
 
 
 def test_a_noise_level_a_little_low_is_not_something_missing():
-    found = tj.fit(sample(5.0, stated=3.7), "neo-hookean", multistart=1)
+    found = tj.fit(sample(5.0, stated=3.7), "neo-hookean", search=ONCE)
     assert 1.15 < found.chi2_per_dof < 1.5
     assert not beyond_noise(found)
     assert "as well as the noise allows" in sentences.overall(found)
     assert not any("lack" in step for step in sentences.next_steps(found))
-    worse = tj.fit(sample(5.0, stated=2.5), "neo-hookean", multistart=1)
+    worse = tj.fit(sample(5.0, stated=2.5), "neo-hookean", search=ONCE)
     assert "something is missing" in sentences.overall(worse)
     assert any("lacks" in step for step in sentences.next_steps(worse))
     assert any("exceeds the noise" in w for w in worse.warnings)
 
 
 def test_gross_misfit_and_bounds_are_said_first():
-    found = tj.fit(sample(5.0, stated=0.5), "neo-hookean", multistart=1)
+    found = tj.fit(sample(5.0, stated=0.5), "neo-hookean", search=ONCE)
     assert any("times the noise" in s for s in suspect(found))
-    held = tj.fit(sample(10.0), "neo-hookean", multistart=1, bounds={"energy.mu": (100.0, 2000.0)})
+    held = tj.fit(
+        sample(10.0),
+        "neo-hookean",
+        search=ONCE,
+        unknowns=tj.Unknowns(bounds={"energy.mu": (100.0, 2000.0)}),
+    )
     assert any("upper bound" in s for s in suspect(held))
 
 
@@ -127,6 +134,6 @@ def test_effects_off_is_the_energy_alone():
     made = recording("hold", "uniaxial", time, stretch)
     channel = Channel(time, stress, "Pa", 20.0)
     data = Sample("s", {"hold": Recording("hold", "uniaxial", made.inputs, {"nominal_stress": channel}, {})})
-    found = tj.fit(data, "neo-hookean", effects=["viscoelasticity"], multistart=1)
+    found = tj.fit(data, "neo-hookean", effects=["viscoelasticity"], search=ONCE)
     bare = FitOverlay().prepare(found)[0].bare
     np.testing.assert_allclose(bare, found.values["energy.mu"] * (stretch - stretch**-2), rtol=1e-9, atol=1e-9)

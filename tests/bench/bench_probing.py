@@ -26,13 +26,14 @@ def once(practice: Path) -> dict:
     import tissuejax as tj
     from tissuejax.experiments.predictor import predictor
     from tissuejax.experiments.workers import _workers
+    from tissuejax.fitting.options import Unknowns
     from tissuejax.fitting.probed import fit_probed
     from tissuejax.fitting.setup import problem
     from tissuejax.verbs import material
 
     sample = tj.read(practice / "p01.h5")
     model = material("reduced-polynomial-2", volumetric="quadratic")
-    posed = problem(predictor(model, sample, ["r1", "r2"]), start=START)
+    posed = problem(predictor(model, sample, ["r1", "r2"]), unknowns=Unknowns(start=START))
     found = fit_probed(posed, holdout=("r3",))
     wall = time.perf_counter() - begun
     for worker in _workers:

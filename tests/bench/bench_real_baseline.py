@@ -151,7 +151,12 @@ def ours(sample: Sample, law: str, timed: bool) -> tuple[float, dict, float]:
     base = energy(law, "2mu/alpha^2") if law.startswith("ogden") else energy(law)
     slow = Viscoelasticity(terms=TERMS)
     fixed = {"effects.viscoelasticity.nominal": 1.0} if timed else None
-    found = tj.fit(sample, Model(base, None, (slow,) if timed else ()), weights="uniform", fix=fixed)
+    found = tj.fit(
+        sample,
+        Model(base, None, (slow,) if timed else ()),
+        objective=tj.Objective(weights="uniform"),
+        unknowns=tj.Unknowns(fix=fixed),
+    )
     squares = [(c.rmse**2 * c.n, c.n) for c in found.channels.values()]
     rmse = float(np.sqrt(sum(s for s, _ in squares) / sum(n for _, n in squares)))
     return rmse, {k: float(v) for k, v in found.values.items()}, time.perf_counter() - begun

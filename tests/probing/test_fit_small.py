@@ -14,6 +14,7 @@ from tests.probing.bench import BODY, QUICK, VALUES, measured, model, recording,
 from tissuejax.effects.catalogue import suited
 from tissuejax.errors import InputError
 from tissuejax.experiments.predictor import predictor
+from tissuejax.fitting.options import Objective, Unknowns
 from tissuejax.fitting.probed import Checkpoint, fit_probed
 from tissuejax.fitting.setup import problem
 from tissuejax.fitting.stress_curve import fit_stress_curve
@@ -36,7 +37,7 @@ def posed(geometry=BODY, settings=QUICK):
     told = predictor(model(), blank, settings=settings).predict(VALUES)["r1"]
     noisy = measured(told, blank.recordings["r1"], np.random.default_rng(5))
     p = predictor(model(), Sample("bench", {"r1": noisy}, geometry, 1000.0), settings=settings)
-    return problem(p, start=START, fix=KNOWN)
+    return problem(p, unknowns=Unknowns(start=START, fix=KNOWN))
 
 
 @pytest.mark.parametrize("geometry", [BODY, tets()], ids=["hexes", "tets"])
@@ -62,7 +63,7 @@ def test_the_stress_curve_iteration_takes_one_site_and_lowers_its_force_error():
     assert found.record()["sites"]["r1"]["force"] == force
     two = predictor(model(), sample(recording("a"), recording("b")), settings=QUICK)
     with pytest.raises(InputError, match="takes one probing, got a, b"):
-        fit_stress_curve(problem(two, start=START, fix=KNOWN))
+        fit_stress_curve(problem(two, unknowns=Unknowns(start=START, fix=KNOWN)))
 
 
 def fit(checkpoint, on_accept=None):
@@ -98,8 +99,9 @@ def test_what_was_kept_of_another_question_is_not_taken(tmp_path):
     deeper, wider = recording(depth=3.1e-3), recording(radius=8.1e-3)
     moved = Geometry(BODY.points * 1.01, BODY.cells, BODY.cell_type, BODY.fixed)
 
-    def asked(given=one, settings=QUICK, fix=KNOWN, **options):
-        return problem(predictor(model(), given, settings=settings), start=START, fix=fix, **options)
+    def asked(given=one, settings=QUICK, objective=None, fix=KNOWN, **limits):
+        unknowns = Unknowns(start=START, fix=fix, **limits)
+        return problem(predictor(model(), given, settings=settings), unknowns, objective)
 
     Checkpoint(path, asked()).keep({"energy.C10": 555.0})
     assert Checkpoint(path, asked()).values()["energy.C10"] == 555.0
@@ -112,8 +114,8 @@ def test_what_was_kept_of_another_question_is_not_taken(tmp_path):
         asked(fix=KNOWN | {"energy.C20": 310.0}),
         asked(priors={"energy.C10": (500.0, 50.0)}),
         asked(bounds={"energy.C10": (0.0, 900.0)}),
-        asked(weights={"force": 0.004, "markers": 6e-5}),
-        asked(loss="cauchy"),
+        asked(objective=Objective(weights={"force": 0.004, "markers": 6e-5})),
+        asked(objective=Objective(loss="cauchy")),
     ]
     assert [Checkpoint(path, other).values()["energy.C10"] for other in others] == [800.0] * len(others)
 

@@ -11,6 +11,7 @@ from tissuejax.experiments import programs
 from tissuejax.experiments.homogeneous import local
 from tissuejax.experiments.predictor import predictor
 from tissuejax.experiments.probing_predictor import _linearised, _vector
+from tissuejax.fitting.options import Unknowns
 from tissuejax.fitting.probed import fit_probed
 from tissuejax.fitting.setup import problem
 from tissuejax.recordings.recording import Sample
@@ -60,7 +61,9 @@ def test_a_fit_that_knows_of_gravity_finds_the_stiffness(heavy):
     known = {"energy.C20": 300.0, "volumetric.K": 10e3}
     with_it = predictor(heavy.model, heard, settings=QUICK)
     found = fit_probed(
-        problem(with_it, start={"energy.C10": 800.0}, fix=known | WEIGHT), numerical=False, finish=False
+        problem(with_it, unknowns=Unknowns(start={"energy.C10": 800.0}, fix=known | WEIGHT)),
+        numerical=False,
+        finish=False,
     ).fit
     assert found.converged, found.status
     assert abs(found.values["energy.C10"] - VALUES["energy.C10"]) < 3 * found.std["energy.C10"]

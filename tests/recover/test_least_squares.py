@@ -9,10 +9,13 @@ from toy import ToyPredictor, curve, toy_sample
 from tissuejax.errors import InputError, NotConverged
 from tissuejax.fitting.advice import mean_factor
 from tissuejax.fitting.least_squares import descend, fit, required
+from tissuejax.fitting.options import Search
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.profile import profile
 from tissuejax.fitting.weights import noise
 from tissuejax.recordings.recording import Channel, Recording, Sample
+
+ONCE = Search(multistart=1)
 
 TRUE = {"energy.a": 80.0, "energy.b": 40.0, "energy.rate": 0.7, "energy.offset": 5.0}
 ALL = tuple(TRUE)
@@ -80,7 +83,7 @@ def test_the_estimated_level_is_unbiased_with_few_samples():
     for trial in range(60):
         sample = toy_sample(np.random.default_rng(trial), TRUE, n=7, names=("r1",), noise=2.0, recorded=False)
         p = problem(sample, ("energy.a", "energy.b", "energy.offset"), start={"energy.rate": 0.7})
-        squares.append(fit(p, multistart=1).problem.noise.std["r1/nominal_stress"] ** 2)
+        squares.append(fit(p, search=ONCE).problem.noise.std["r1/nominal_stress"] ** 2)
     assert np.mean(squares) == pytest.approx(4.0, rel=0.3)  # chi-square with 4 degrees, mean of 60: 9 %
 
 
@@ -100,7 +103,7 @@ def drawn(make, free, draws):
     """Estimates and standard errors over independent draws, and how often intervals hold the truth."""
     values, std, inside = [], [], []
     for trial in range(draws):
-        found = fit(problem(make(np.random.default_rng(trial)), free, start=TRUE), multistart=1)
+        found = fit(problem(make(np.random.default_rng(trial)), free, start=TRUE), search=ONCE)
         values.append([found.values[k] for k in free])
         std.append([found.std[k] for k in free])
         inside.append([low < TRUE[k] < high for k, (low, high) in found.intervals.items()])
@@ -118,8 +121,8 @@ CASES = {
 
 
 def test_what_is_said_of_correlated_residuals_is_what_was_done(rng):
-    slow = fit(problem(correlated_sample(rng, 0.9, 1.0, 1.0), TWO, start=TRUE), multistart=1)
-    independent = fit(problem(toy_sample(rng, TRUE), TWO, start=TRUE), multistart=1)
+    slow = fit(problem(correlated_sample(rng, 0.9, 1.0, 1.0), TWO, start=TRUE), search=ONCE)
+    independent = fit(problem(toy_sample(rng, TRUE), TWO, start=TRUE), search=ONCE)
     times = max(slow.std[k] / independent.std[k] for k in TWO)
     (said,) = [w for w in slow.warnings if "serially correlated" in w]
     assert f"{times:.1f} times larger" in said
@@ -128,7 +131,7 @@ def test_what_is_said_of_correlated_residuals_is_what_was_done(rng):
 
 
 def test_noise_stated_too_large_is_said(rng):
-    found = fit(problem(correlated_sample(rng, 0.0, 0.5, 1.0), TWO, start=TRUE), multistart=1)
+    found = fit(problem(correlated_sample(rng, 0.0, 0.5, 1.0), TWO, start=TRUE), search=ONCE)
     assert any("times the recorded noise: check the noise level" in w for w in found.warnings)
 
 
@@ -175,7 +178,7 @@ def test_a_robust_loss_lets_outliers_be(rng):
 @pytest.mark.parametrize("method", ["adam", "lbfgs"])
 def test_gradient_methods_find_the_same_minimum(rng, method):
     p = problem(toy_sample(rng, TRUE), ("energy.a", "energy.rate", "energy.offset"), start={"energy.b": 40.0})
-    reference, found = fit(p), fit(p, method=method, multistart=1)
+    reference, found = fit(p), fit(p, search=Search(method=method, multistart=1))
     assert found.converged
     assert found.chi2 == pytest.approx(reference.chi2, rel=1e-3)
 
@@ -293,7 +296,7 @@ def test_too_few_samples_are_refused(rng):
 
 
 def test_a_search_cut_short_says_so(rng):
-    found = fit(problem(toy_sample(rng, TRUE)), multistart=1, max_steps=2)
+    found = fit(problem(toy_sample(rng, TRUE)), search=Search(multistart=1, max_steps=2))
     assert not found.converged
     assert "no convergence after" in found.warnings[0]
     with pytest.raises(NotConverged, match="no convergence"):

@@ -10,10 +10,13 @@ from tissuejax.experiments.predictor import predictor
 from tissuejax.fitting.idle import merged, woken
 from tissuejax.fitting.idle import terms as idle_terms
 from tissuejax.fitting.least_squares import descend
+from tissuejax.fitting.options import Unknowns
 from tissuejax.fitting.setup import problem, split
 from tissuejax.fitting.starts import neutral
 from tissuejax.fitting.transforms import Box, Sticks, chained, unchained
 from tissuejax.recordings.recording import Channel, Recording, Sample
+
+ONCE = tj.Search(multistart=1)
 
 MU, NOISE = 4000.0, 5.0
 STEP = 0.1
@@ -70,7 +73,7 @@ def test_one_term_is_found_on_tension_and_compression_together():
 def test_the_sum_of_the_shares_stays_below_one_where_the_data_would_have_more():
     """Stress that goes on falling, to below zero in the end: the best sum of a free fit is above 1."""
     sample = pulled([(0.6, 2.0), (0.55, 20.0)], tops=(1.2,))
-    found = tj.fit(sample, "neo-hookean", effects=["viscoelasticity-2"], multistart=2)
+    found = tj.fit(sample, "neo-hookean", effects=["viscoelasticity-2"], search=tj.Search(multistart=2))
     total = sum(found.values[f"effects.viscoelasticity.g{i}"] for i in (1, 2))
     assert 0.9 < total < 1.0
     assert all(found.values[f"effects.viscoelasticity.g{i}"] >= 0 for i in (1, 2))
@@ -85,9 +88,11 @@ def test_times_lie_between_the_sampling_and_three_lengths():
         path = f"effects.viscoelasticity.tau{i}"
         assert posed.bound(path) == pytest.approx((STEP, 3 * 59.9))
         assert STEP < posed.start[path] < 60
-    given = problem(predictor(model, sample, fitted), bounds={"effects.viscoelasticity.tau1": (1e-3, 1.0)})
+    given = problem(
+        predictor(model, sample, fitted), unknowns=Unknowns(bounds={"effects.viscoelasticity.tau1": (1e-3, 1.0)})
+    )
     assert given.bound("effects.viscoelasticity.tau1") == (1e-3, 1.0)
-    fixed = problem(predictor(model, sample, fitted), fix={"effects.viscoelasticity.tau1": 1e-3})
+    fixed = problem(predictor(model, sample, fitted), Unknowns(fix={"effects.viscoelasticity.tau1": 1e-3}))
     assert fixed.start["effects.viscoelasticity.tau1"] == 1e-3
 
 
@@ -123,13 +128,16 @@ def test_a_larger_model_is_never_worse_than_the_one_inside_it():
 
 
 def test_a_recording_cut_out_of_a_longer_one_is_told_so():
-    whole = tj.fit(pulled([(0.35, 8.0)], length=30.0), "neo-hookean", effects=["viscoelasticity-1"], multistart=1)
+    whole = tj.fit(pulled([(0.35, 8.0)], length=30.0), "neo-hookean", effects=["viscoelasticity-1"], search=ONCE)
     assert not any("begins under load" in w for w in whole.warnings)
     rest = tj.fit(
-        pulled([(0.35, 8.0)], length=30.0, cut=230), "neo-hookean", effects=["viscoelasticity-1"], multistart=1
+        pulled([(0.35, 8.0)], length=30.0, cut=230),
+        "neo-hookean",
+        effects=["viscoelasticity-1"],
+        search=ONCE,
     )
     assert any("begins under load" in w for w in rest.warnings)
-    elastic = tj.fit(pulled([(0.35, 8.0)], length=30.0, cut=230), "neo-hookean", multistart=1)
+    elastic = tj.fit(pulled([(0.35, 8.0)], length=30.0, cut=230), "neo-hookean", search=ONCE)
     assert not any("begins under load" in w for w in elastic.warnings)
 
 

@@ -21,12 +21,19 @@ from tissuejax.report.sensitivities import Directions, Sensitivities
 from tissuejax.report.series import curves, displacements
 from tissuejax.report.sobol_bars import SobolBars
 
+ONCE = tj.Search(multistart=1)
+
 ROOT = __import__("pathlib").Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
 def found():
-    return tj.fit(ROOT / "data" / "demo" / "elastic.h5", "reduced-polynomial-2", holdout=["holdout"], multistart=1)
+    return tj.fit(
+        ROOT / "data" / "demo" / "elastic.h5",
+        "reduced-polynomial-2",
+        holdout=["holdout"],
+        search=ONCE,
+    )
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from tissuejax.recordings.files import read, read_all
 from tissuejax.recordings.recording import Sample
 
 KINDS = ("fit", "diagnose")
-BY_PATH = ("fix", "start", "bounds", "priors")
+BY_PATH = {"fix", "start", "bounds", "priors"}
 UNSTORED = ("seconds", "versions", "trace")  # of a fit's record: not part of the answer, or too long for a cohort
 
 
@@ -138,22 +138,24 @@ def _solved(task: Task) -> dict[str, Any]:
     from tissuejax.energies import catalogue
     from tissuejax.experiments.predictor import predictor
     from tissuejax.fitting.least_squares import fit
+    from tissuejax.fitting.options import Objective, Search, Unknowns
     from tissuejax.fitting.setup import problem, split
     from tissuejax.model import Model
 
     bulk = catalogue.volumetric(s.volumetric) if s.volumetric else None
     model = Model(catalogue.energy(s.energy, s.ogden_form), bulk, tuple(effect(name) for name in s.effects))
-    asked = dict(s.fit)
-    descent = {k: asked.pop(k) for k in ("max_steps", "method") if k in asked}
-    posing = {
-        k: {path: float(of[0]) if len(of) == 1 else tuple(map(float, of)) for path, *of in asked.pop(k)}
-        for k in BY_PATH
-        if k in asked
-    }
+    asked: dict[str, Any] = dict(s.fit)
+    for k in BY_PATH & asked.keys():
+        asked[k] = {path: float(of[0]) if len(of) == 1 else tuple(map(float, of)) for path, *of in asked[k]}
     fitted, held = split(sample, tuple(n for n in asked.pop("only", ()) if n in sample.recordings), held)
-    posed = problem(predictor(model, sample, fitted), **posing, **asked)
-    start = dict(posed.start) if "start" in posing else None
-    found = fit(posed, start=start, multistart=s.multistart, holdout=held, seed=s.seed, **descent)
+    unknowns, objective, search = (
+        kind(**{f.name: asked[f.name] for f in fields(kind) if f.name in asked})
+        for kind in (Unknowns, Objective, Search)
+    )
+    posed = problem(predictor(model, sample, fitted), unknowns, objective)
+    start = dict(posed.start) if unknowns.start else None
+    search = replace(search, multistart=s.multistart, seed=s.seed)
+    found = fit(posed, start=start, search=search, holdout=held)
     return {name: value for name, value in found.record().items() if name not in UNSTORED}
 
 

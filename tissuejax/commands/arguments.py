@@ -3,8 +3,10 @@
 import argparse
 import math
 from collections.abc import Mapping
+from pathlib import Path
 
 from tissuejax.errors import InputError, unknown
+from tissuejax.fitting.options import Objective, Search, Unknowns
 from tissuejax.parameters import Parameter
 from tissuejax.units import quantity
 
@@ -76,24 +78,27 @@ def add_fit(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def fit_options(given: argparse.Namespace, declared: Mapping[str, Parameter]) -> dict:
-    """The keyword arguments of `tj.fit` from what was typed."""
+def fit_options(given: argparse.Namespace, declared: Mapping[str, Parameter], checkpoint: Path | None = None) -> dict:
+    """The keyword arguments of `tj.fit` from what was typed; `checkpoint` keeps a probing's last iterate."""
     return {
         "only": given.only,
         "holdout": given.holdout,
-        "free": given.free,
-        "fix": values(given.fix, declared, "--fix"),
-        "start": values(given.start, declared, "--start"),
-        "bounds": ranges(given.bounds, declared, "--bounds"),
-        "priors": ranges(given.prior, declared, "--prior"),
-        "weights": given.weights,
-        "channels": given.channel,
-        "loss": given.loss,
-        "method": given.method,
-        "multistart": positive(given.multistart, "--multistart"),
-        "max_steps": positive(given.max_steps, "--max-steps"),
-        "seed": given.seed,
-        "stable": given.stable,
+        "unknowns": Unknowns(
+            free=tuple(given.free) if given.free is not None else None,
+            fix=values(given.fix, declared, "--fix"),
+            start=values(given.start, declared, "--start"),
+            bounds=ranges(given.bounds, declared, "--bounds"),
+            priors=ranges(given.prior, declared, "--prior"),
+            stable=given.stable,
+        ),
+        "objective": Objective(given.weights, tuple(given.channel), given.loss),
+        "search": Search(
+            given.method,
+            positive(given.multistart, "--multistart"),
+            given.seed,
+            positive(given.max_steps, "--max-steps"),
+            checkpoint,
+        ),
     }
 
 

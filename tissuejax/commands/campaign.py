@@ -17,11 +17,11 @@ from tissuejax.commands.arguments import add_fit, add_model, fit_options, positi
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.outputs import WITH_A_PAGE
 from tissuejax.errors import InputError
+from tissuejax.fitting.options import Objective, Search
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read_all
 from tissuejax.storage import write_text
 
-PLAIN = {"weights": "auto", "loss": "squares", "method": "levenberg-marquardt", "max_steps": 200}
 ACTIONS = ("run", "resume", "status", "report", "population")
 
 
@@ -105,18 +105,21 @@ def _settings(given: argparse.Namespace) -> Settings:
         given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
     ).across(tuple(first.recordings))
     options = fit_options(given, model.parameters)
-    common = {name: options.pop(name) for name in ("holdout", "multistart", "seed")}
+    search = options["search"]
+    said = {"only": options["only"], "method": search.method, "max_steps": search.max_steps}
+    said |= vars(options["unknowns"]) | vars(options["objective"])
+    plain = vars(Search()) | vars(Objective())
     pairs = []
-    for name, value in options.items():
-        if value == PLAIN.get(name) or value in (None, [], {}, False):
+    for name, value in said.items():
+        if value == plain.get(name) or value in (None, [], {}, (), False):
             continue
         if isinstance(value, dict):
             of = {path: v if isinstance(v, tuple) else (v,) for path, v in value.items()}
             value = tuple((path, *(x if math.isfinite(x) else str(x) for x in v)) for path, v in of.items())
         pairs.append((name, tuple(value) if isinstance(value, list) else value))
     return Settings(
-        given.kind, given.energy, given.ogden_form, given.volumetric, tuple(given.effect), tuple(common["holdout"]),
-        common["multistart"], common["seed"], tuple(pairs) if given.kind == "fit" else (),
+        given.kind, given.energy, given.ogden_form, given.volumetric, tuple(given.effect), tuple(options["holdout"]),
+        search.multistart, search.seed, tuple(pairs) if given.kind == "fit" else (),
     )  # fmt: skip
 
 

@@ -71,9 +71,7 @@ misfit of several times the noise. With 3 and 4 what was found is written all th
             given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
         ).across(tuple(sample.recordings))
         out = folder(given.out, "fit", sample.name, _named(model), given.force)
-        found = verbs.fit(
-            sample, model, progress=for_terminal(), checkpoint=out / KEPT, **fit_options(given, model.parameters)
-        )
+        found = verbs.fit(sample, model, progress=for_terminal(), **fit_options(given, model.parameters, out / KEPT))
         return reply(found, verbs.write(found, out))
 
     def _each(self, given: argparse.Namespace) -> Reply:

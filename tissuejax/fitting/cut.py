@@ -29,6 +29,7 @@ from tissuejax.fitting.cut_resolution import plane_modulus, refuse_joules
 from tissuejax.fitting.cut_result import ENERGY, FRICTION, OPEN, STRENGTH, CutFit, described, misfit_said
 from tissuejax.fitting.least_squares import descend
 from tissuejax.fitting.levenberg_marquardt import Descent
+from tissuejax.fitting.options import Unknowns
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.setup import problem
 from tissuejax.fitting.uncertainty import uncertainty
@@ -192,7 +193,7 @@ def _misfit(made, free, values) -> float:
 
 def _posed(made, free, values, reach):
     bounds = {p: (values[p] / k, values[p] * k) for p, k in reach.items() if p in free}
-    return problem(made, free=free, start=values, bounds=bounds)
+    return problem(made, unknowns=Unknowns(free=free, start=values, bounds=bounds))
 
 
 def _unidentified(p, values, std, free, at_bound) -> dict[str, str]:

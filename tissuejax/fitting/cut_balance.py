@@ -12,6 +12,7 @@ from tissuejax.experiments.cutting_record import FORCE, drawn, path_of, steady
 from tissuejax.experiments.predictor import predictor
 from tissuejax.fitting.cut_result import ENERGY, FRICTION, ONSET, STRENGTH, CutFit, misfit_said
 from tissuejax.fitting.least_squares import descend
+from tissuejax.fitting.options import Unknowns
 from tissuejax.fitting.setup import problem
 from tissuejax.fitting.uncertainty import uncertainty
 from tissuejax.model import Model
@@ -37,7 +38,7 @@ def by_balance(
             guess.append(np.median(np.asarray(seen.values)[fresh] / np.maximum(deep, 1e-6)))
         values[ENERGY] = max(0.05, 0.7 * float(np.mean(guess)))
     values[FRICTION] = known.get(FRICTION, 0.05)
-    posed = problem(p, free=tuple(free), start=values)
+    posed = problem(p, unknowns=Unknowns(free=tuple(free), start=values))
     ended = descend(posed, values, max_steps=60)
     found = posed.values(ended.y)
     r, J = posed.linearised(found)

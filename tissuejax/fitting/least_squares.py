@@ -20,6 +20,7 @@ from tissuejax.fitting.gradient_descent import gradient_descent
 from tissuejax.fitting.idle import terms, woken
 from tissuejax.fitting.levenberg_marquardt import Descent, levenberg_marquardt
 from tissuejax.fitting.losses import soften
+from tissuejax.fitting.options import Search
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
@@ -95,11 +96,8 @@ def fit(
     problem: Problem,
     *,
     start: Mapping[str, float] | None = None,
-    multistart: int = 4,
-    method: str = "levenberg-marquardt",
+    search: Search | None = None,
     holdout: tuple[str, ...] = (),
-    seed: int = 0,
-    max_steps: int = 200,
     on_accept: Callable[[int, float, dict[str, float]], None] | None = None,
 ) -> Fit:
     """Estimate the free parameters of a problem.
@@ -107,22 +105,20 @@ def fit(
     Args:
         problem: predictor, free parameters, noise, bounds, priors.
         start: values to begin with, taken as they are; None solves for the moduli first.
-        multistart: number of starts (the first as given, the others seeded variations); the best end wins.
-        method: "levenberg-marquardt", "adam" or "lbfgs".
+        search: method, number of starts and steps.
         holdout: recordings of the sample, outside the problem, to predict and score.
-        seed: of the further starts.
-        max_steps: evaluations for each start.
         on_accept: told evaluations, chi-square and values after every accepted step.
 
     Raises:
         InputError: a start at which the model has no finite prediction, an unknown method or recording.
         NotConverged: no start led to a finite misfit.
     """
-    begun = time.perf_counter()
+    begun, search = time.perf_counter(), search or Search()
+    multistart, method, max_steps = search.multistart, search.method, search.max_steps
     first = dict(problem.start) | dict(start or {})
     if start is None and not separable(problem):
         first = fitted_moduli(problem, first)
-    tries = [first, *variations(problem, first, multistart - 1, seed)]
+    tries = [first, *variations(problem, first, multistart - 1, search.seed)]
     n, ends = 0, []
     options = {"method": method, "max_steps": max_steps, "on_accept": on_accept}
     for held in neutral(problem) if start is None and multistart > 1 else ():

@@ -1,11 +1,11 @@
 """From what a user says (which recordings, what is fixed, bounds, priors) to a checked problem."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.predictor import Predictor
 from tissuejax.fitting.memory import spread, time_bounds
+from tissuejax.fitting.options import Objective, Unknowns
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.transforms import checked_bounds
 from tissuejax.fitting.weights import noise
@@ -49,45 +49,31 @@ def split(
 
 def problem(
     predictor: Predictor,
-    *,
-    free: tuple[str, ...] | None = None,
-    fix: Mapping[str, float] | None = None,
-    start: Mapping[str, float] | None = None,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    priors: Mapping[str, tuple[float, float]] | None = None,
-    weights: str | Mapping[str, float] = "auto",
-    channels: tuple[str, ...] = (),
-    loss: str = "squares",
-    stable: bool = False,
+    unknowns: Unknowns | None = None,
+    objective: Objective | None = None,
 ) -> Problem:
     """A problem with everything that is not said taken from the declarations.
 
     Args:
         predictor: model, sample and the recordings that take part.
-        free: what to estimate; by default all parameters that are neither fixed nor declared frozen.
-        fix: values that stay as they are.
-        start: where to begin; defaults are the declared ones, moved inside any bounds given here.
-        bounds: (lower, upper) by path; relaxation times lie by default between the sampling step and three times the
-            longest recording.
-        priors: (mean, standard deviation) by path.
-        weights: "auto", "uniform", "relative" or standard deviations by channel.
-        channels: only these channels, e.g. ("force",).
-        loss: "squares", "soft-l1" or "cauchy".
-        stable: keep the energy stable (Drucker) over the recorded stretches.
+        unknowns: what is estimated, and within which limits.
+        objective: what a unit of misfit means.
 
     Raises:
         InputError: unknown paths, values outside their range, empty bounds, too few samples.
     """
+    unknowns, objective = unknowns or Unknowns(), objective or Objective()
+    free, priors = unknowns.free, dict(unknowns.priors or {})
     declared = predictor.model.parameters
-    fix, start, bounds = dict(fix or {}), dict(start or {}), dict(bounds or {})
+    fix, start, bounds = dict(unknowns.fix or {}), dict(unknowns.start or {}), dict(unknowns.bounds or {})
     checked(fix, declared)
     checked(start, declared)
     seen = {p: b for p, b in time_bounds(predictor).items() if p not in {*fix, *start, *bounds}}
-    for path in (*bounds, *(free or ()), *(priors or {})):
+    for path in (*bounds, *(free or ()), *priors):
         if path not in declared:
             raise unknown("parameter", path, declared)
     if free is None:
-        named = {*start, *bounds, *(priors or {})}
+        named = {*start, *bounds, *priors}
         free = tuple(p for p, d in declared.items() if p not in fix and (not d.frozen or p in named))
     clash = sorted(set(free) & set(fix))
     if clash:
@@ -98,6 +84,6 @@ def problem(
         lower, upper = checked_bounds(path, lower, upper)
         if path not in start and path not in fix:
             values[path] = min(max(values[path], lower), upper)
-    found = noise(predictor.sample, predictor.names, weights, channels)
-    posed = Problem(predictor, tuple(free), values, found, bounds, dict(priors or {}), loss)
-    return replace(posed, stiffness=STIFFNESS * posed.n_samples**0.5) if stable else posed
+    found = noise(predictor.sample, predictor.names, objective.weights, tuple(objective.channels))
+    posed = Problem(predictor, tuple(free), values, found, bounds, priors, objective.loss)
+    return replace(posed, stiffness=STIFFNESS * posed.n_samples**0.5) if unknowns.stable else posed

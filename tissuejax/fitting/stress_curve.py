@@ -17,6 +17,7 @@ from tissuejax.errors import InputError, UnstableSimulation
 from tissuejax.experiments.predictor import predictor
 from tissuejax.experiments.probing_predictor import ProbingPredictor
 from tissuejax.fitting.least_squares import descend
+from tissuejax.fitting.options import Unknowns
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
@@ -166,6 +167,6 @@ def refit(
     target = np.asarray(curve.channels["nominal_stress"].values, float) * np.concatenate([[factor[0]], factor])
     noise = 0.01 * float(np.abs(target).max())
     wanted = Recording("curve", "uniaxial", test.inputs, {"nominal_stress": Channel(time, target, "Pa", noise)})
-    posed = problem(predictor(alone, Sample("curve", {"curve": wanted})), start=energy, stable=True)
+    posed = problem(predictor(alone, Sample("curve", {"curve": wanted})), unknowns=Unknowns(start=energy, stable=True))
     found = posed.values(descend(posed).y)
     return dict(values) | found, recorded_stability(posed.predictor, found).stable
