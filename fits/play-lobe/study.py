@@ -25,6 +25,7 @@ from tissuejax.mesh.columns import box, lobe_of_mesh
 from tissuejax.model import Model
 from tissuejax.play import haptics
 from tissuejax.progress import for_terminal
+from tissuejax.recordings.recording import Geometry
 from tissuejax.storage import write_json
 from tissuejax.surrogate import store
 from tissuejax.surrogate.live.ask import Asker
@@ -33,7 +34,7 @@ from tissuejax.surrogate.places import Box
 from tissuejax.surrogate.precompute import precompute
 from tissuejax.surrogate.predict import force_along
 from tissuejax.surrogate.ramp import Matter, bare_setup
-from tissuejax.surrogate.site_mesh import Grid, geometry, topology
+from tissuejax.surrogate.site_mesh import Grid, geometry, half, nodes, topology
 from tissuejax.tled.simulate import run
 
 jax.config.update("jax_enable_x64", True)
@@ -101,10 +102,20 @@ PHASES = {
 }
 
 
-def full(tissue: Matter, counts, t, path, speed: float) -> tuple[np.ndarray, np.ndarray, int]:
+def narrow(tissue: Matter, grid: Grid, core: float) -> Geometry:
+    """A mesh whose equal elements about the middle reach only as far as `core`, m."""
+    wide = []
+    for n, inner in zip(grid.counts[:2], grid.inner):
+        right = half(SIZE[0] / 2, core, inner, n // 2 - inner)
+        wide.append(0.5 + np.concatenate([-right[::-1], [0.0], right]) / SIZE[0])
+    cells, fixed, _ = topology(grid)
+    return Geometry(nodes(tissue.lobe, *wide, grid.counts[2]).reshape(-1, 3), cells, "hexahedron", fixed)
+
+
+def full(tissue: Matter, counts, t, path, speed: float, core=None) -> tuple[np.ndarray, np.ndarray, int]:
     """Times and forces of TLED on a fixed mesh along a path, `speed` times faster than life; and the elements."""
     grid, interval = Grid(counts, 1.25 * RADIUS), float(t[1] - t[0])
-    body = geometry(tissue.lobe, np.zeros(2), grid)
+    body = geometry(tissue.lobe, np.zeros(2), grid) if core is None else narrow(tissue, grid, core)
     setup = bare_setup(tissue, body, topology(grid)[2], np.zeros(2), TOP + RADIUS)
     scene, _ = assembled(tissue.model, {k: jnp.asarray(float(v)) for k, v in tissue.values.items()}, setup)
     scene = scene.put({
@@ -169,19 +180,23 @@ def pulled(t, depth, at, force) -> dict:
 
 
 def stuck(surrogate, strengths=(200.0, 1000.0), reach: float = 2e-4) -> dict:
-    """Adhesion without relaxation: the greatest pull on the way out and the height at which the ball comes free."""
+    """Adhesion without relaxation: the greatest pull on the way out and the height at which the ball comes free, beside
+    the full model on elements of 2, 1 and 0.6 mm under the ball."""
     found, bare = {}, surrogate.put({"memory.g": jnp.zeros(2)})
     t = np.arange(0, 4.0, 0.01)
     d = np.interp(t, [0, 1, 1.5, 4.0], [-3e-4, 3e-3, 3e-3, -4.5e-3])
     path = np.stack([0 * t, 0 * t, TOP + RADIUS - d], 1)
+    meshes = {"2 mm": ((16, 16, 6), None), "1 mm": ((16, 16, 6), 5e-3), "0.6 mm": ((24, 24, 8), 5e-3)}
     for strength in strengths:
         values = {"effects.adhesion.strength": strength, "effects.adhesion.reach": reach}
-        at, force, _ = full(matter(Adhesion(), **values), (16, 16, 6), t, path, 1.5)
-        ours = along(bare.put({"rub.strength": strength, "rub.reach": reach}), t, path, at)
-        found[f"{strength:g} Pa"] = {
-            "full": pulled(t, d, at, force), "surrogate": pulled(t, d, at, ours),
-            "rms_over_peak": float(np.sqrt(np.mean((ours - force)[:, 2] ** 2)) / force[:, 2].max()),
-        }  # fmt: skip
+        ours = along(bare.put({"rub.strength": strength, "rub.reach": reach}), t, path, t)
+        one = {"surrogate": pulled(t, d, t, ours)}
+        for name, (counts, core) in meshes.items():
+            at, force, elements = full(matter(Adhesion(), **values), counts, t, path, 3.0, core)
+            mine = along(bare.put({"rub.strength": strength, "rub.reach": reach}), t, path, at)
+            rms = float(np.sqrt(np.mean((mine - force)[:, 2] ** 2)) / force[:, 2].max())
+            one[name] = pulled(t, d, at, force) | {"elements": elements, "surrogate_rms_over_peak": rms}
+        found[f"{strength:g} Pa"] = one
     return found
 
 

@@ -1,17 +1,19 @@
 """The full model in the loop: what it tends to, what it forgets, and when it is refused."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from tests.surrogate import made
 from tissuejax.errors import InputError, UnstableSimulation
-from tissuejax.surrogate.live.direct import Direct, Pace, keeps_up, largest
+from tissuejax.surrogate.live.direct import Direct, Pace, direct_scene, keeps_up, largest, shortened
 from tissuejax.surrogate.ramp import ramp
 from tissuejax.surrogate.site_mesh import Grid
+from tissuejax.tled.stable import critical_steps, fastest
 
 
 def test_a_held_press_tends_to_static_equilibrium_and_rest_forgets():
-    direct = Direct(made.matter(), made.SMALL, np.zeros(2))
+    direct = Direct(direct_scene(made.matter(), made.SMALL, np.zeros(2)), 1.5e-3)
     begin, touch = direct.at, 0.018
     first = direct.displacement
     path = np.concatenate([np.linspace(begin[2], touch - 1.5e-3, 200), np.full(300, touch - 1.5e-3)])
@@ -25,6 +27,23 @@ def test_a_held_press_tends_to_static_equilibrium_and_rest_forgets():
     assert np.array_equal(direct.displacement, first)
     again = np.array([direct.move(np.array([0, 0, z])) for z in path[:250]])
     assert np.array_equal(again, force[:250])
+
+
+def test_the_step_is_as_short_as_the_pressed_tissue_needs():
+    """Linear vibrations whose greatest frequency is known; and a step that is too long is shortened."""
+    mass = jnp.array([1.0, 2.0, 4.0])
+    stiffness = jnp.array([[4.0, -1.0, 0.0], [-1.0, 8.0, -2.0], [0.0, -2.0, 90.0]])
+    held = jnp.zeros((3, 3), bool).at[:, 2].set(True)
+    found = fastest(lambda u: u @ stiffness, mass, held, jnp.zeros((3, 3)))
+    root = np.sqrt(mass[:2])
+    known = np.linalg.eigvalsh(np.asarray(stiffness[:2, :2]) / np.outer(root, root)).max()
+    assert float(found) == pytest.approx(known**0.5, rel=1e-3)
+    scene = direct_scene(made.matter(**{"volumetric.K": 60e3}), made.SMALL, np.zeros(2))
+    long = shortened(scene, 2)
+    assert float(long.clock.step) > float(critical_steps(scene).min())
+    direct = Direct(long, 1.5e-3)
+    assert direct.step < float(critical_steps(scene).min())
+    assert float(direct.scene.probe.mass.max()) == pytest.approx(float(long.probe.mass.max()) * (2 / direct.steps) ** 2)
 
 
 def test_slow_motion_is_refused_with_a_mesh_that_would_do():

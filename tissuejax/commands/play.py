@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import ClassVar
 
 import h5py
+import jax
 import numpy as np
 
 from tissuejax.commands.command import Command, Reply
@@ -23,9 +24,11 @@ from tissuejax.recordings.files import read
 from tissuejax.surrogate import store
 from tissuejax.surrogate.live import flat
 from tissuejax.surrogate.live.ask import Asker
-from tissuejax.surrogate.live.direct import SLOWEST, Direct, keeps_up, largest
+from tissuejax.surrogate.live.direct import SLOWEST, Direct, direct_scene, keeps_up, largest
+from tissuejax.surrogate.places import within_depth
 from tissuejax.surrogate.precompute import Precomputed
 from tissuejax.surrogate.site_mesh import Grid
+from tissuejax.tled import native
 
 FIRST = "12x12x4"  # the mesh of --direct that is tried first
 
@@ -71,7 +74,8 @@ A loop without permission for real-time priority runs and says so. A direct scen
     def run(self, given: argparse.Namespace) -> Reply:
         """Do it."""
         if given.direct:
-            return _direct(given)
+            with native.preferred() as in_c:
+                return _direct(given, in_c)
         if given.source is None:
             raise InputError("which FILE? make one with `tissuejax precompute`, or use --direct")
         if _is_run(given.source):
@@ -147,22 +151,29 @@ def _replayed(made: Precomputed, given: argparse.Namespace) -> Reply:
     return Reply(record, str(record))
 
 
-def _direct(given: argparse.Namespace) -> Reply:
+def _direct(given: argparse.Namespace, in_c: bool) -> Reply:
+    jax.config.update("jax_cpu_enable_async_dispatch", False)  # another thread costs a call half as much again
     what: Tissue = tissue(given)
     place = what.site if given.site is None else place_of(given.site)
+    within_depth(what.matter.lobe, place[None], given.depth / 1e3)
     grid = Grid(counts_of(given.mesh or FIRST), what.matter.radius)
-    direct = Direct(what.matter, grid, place)
+
+    def ready(grid: Grid) -> Direct:
+        return Direct(direct_scene(what.matter, grid, place), given.depth / 1e3)
+
+    direct = ready(grid)
     pace = direct.pace()
     if given.mesh is None and pace.times_life < SLOWEST:
         grid = largest(pace, grid)
-        direct = Direct(what.matter, grid, place)
+        direct = ready(grid)
         pace = direct.pace()
     keeps_up(pace, grid)
     mesh = "x".join(map(str, grid.counts))
     words = f"mesh {mesh}: {pace.times_life:.1f} times life, a call of {1e3 * direct.call:.2g} ms takes "
     words += f"{pace.call_p50_ms:.2f} ms (p50), {pace.call_p99_ms:.2f} ms (p99)"
     if given.seconds == 0:
-        return Reply({"mesh": list(grid.counts), "pace": pace._asdict()}, words)
+        loop = "C" if in_c else "XLA"
+        return Reply({"mesh": list(grid.counts), "pace": pace._asdict(), "element_loop": loop}, words)
     if not given.json:
         print(words, flush=True)
     title = "slab" if what.sample is None else what.sample.name

@@ -152,15 +152,24 @@ def checked(box: Box, lobe: Lobe, radius: float) -> Box:
             f"the box of places reaches ({x:.1f}, {y:.1f}) mm, {where}; places must keep {RIM:g} probe radii "
             f"({1e3 * RIM * radius:.1f} mm) from the rim: choose another --site or a smaller --reach"
         )
-    thickness = np.array([_thickness(lobe, p) for p in corners])
+    within_depth(lobe, corners, box.depth)
+    return box
+
+
+def within_depth(lobe: Lobe, places: Float[np.ndarray, "n 2"], depth: float) -> None:
+    """Nothing, if the organ is thick enough for the depth at all places.
+
+    Raises:
+        InputError: it is not.
+    """
+    thickness = np.array([_thickness(lobe, p) for p in places])
     thin = int(thickness.argmin())
-    if box.depth > DEEPEST * thickness[thin]:
-        x, y = 1e3 * corners[thin]
+    if depth > DEEPEST * thickness[thin]:
+        x, y = 1e3 * places[thin]
         raise InputError(
-            f"depth {1e3 * box.depth:.1f} mm is over {100 * DEEPEST:.0f} % of the thickness at ({x:.1f}, {y:.1f}) mm, "
+            f"depth {1e3 * depth:.1f} mm is over {100 * DEEPEST:.0f} % of the thickness at ({x:.1f}, {y:.1f}) mm, "
             f"{1e3 * thickness[thin]:.1f} mm: take --depth {1e3 * DEEPEST * thickness[thin]:.1f} mm or less"
         )
-    return box
 
 
 def _thickness(lobe: Lobe, place) -> float:

@@ -1,16 +1,18 @@
 """The element loop of a scene as compiled C (`lanes/`), where a C compiler is; elsewhere what XLA makes of it stands.
 
-It is off unless TISSUEJAX_NATIVE=on. XLA copies between its stages, and each of some 55 operations a block costs a
-call: the step takes 3.2 to 3.7 times what a hand-written one does (tests/bench/yardstick.c, a Zen 3 core under load).
-The same traced formula, written out as C, takes 1.5 times as much (1,000 hexes, float32), a gradient 2.7 runs and a
-Jacobian of five parameters 5.9, whose tangents share what does not depend on them. Energies are still written once, as
-energies: the C is made from what JAX traced of the element, derivatives included.
+It is off unless TISSUEJAX_NATIVE=on, and on in `play --direct`, where each call counts. XLA copies between its stages,
+and each of some 55 operations a block costs a call: the step takes 3.2 to 3.7 times what a hand-written one does
+(tests/bench/yardstick.c, a Zen 3 core under load). The same traced formula, written out as C, takes 1.5 times as much
+(1,000 hexes, float32), a gradient 2.7 runs and a Jacobian of five parameters 5.9, whose tangents share what does not
+depend on them. Energies are still written once, as energies: the C is made from what JAX traced of the element,
+derivatives included.
 """
 
+import contextlib
 import dataclasses
 import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import jax
@@ -32,6 +34,19 @@ MOST = 200  # kernels that are remembered
 def wanted() -> bool:
     """Whether the loop in C was asked for and a compiler is here."""
     return os.environ.get(ENVIRONMENT, "").lower() == "on" and compiler() is not None
+
+
+@contextlib.contextmanager
+def preferred() -> Iterator[bool]:
+    """Within it the loop in C is taken where a compiler is, unless the environment says otherwise; whether it is."""
+    if os.environ.get(ENVIRONMENT):
+        yield wanted()
+        return
+    os.environ[ENVIRONMENT] = "on"
+    try:
+        yield wanted()
+    finally:
+        del os.environ[ENVIRONMENT]
 
 
 def loop(by_element: Callable, scene: "Scene", mesh: Any, history: Any) -> Callable | None:

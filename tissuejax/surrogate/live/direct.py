@@ -2,6 +2,10 @@
 
 Life is simulated at the speed of life; a scene that can't keep up is refused, with its pace and the largest mesh that
 would: slow motion raises the force (the tissue sees a faster hand), and must never happen unsaid.
+
+The step is not foreseen but tried: the ball is pressed in as deep as it will go, the fastest vibration of what is under
+it is measured there, and where the step is too long for that it is shortened and tried again. On elements as large as
+the ball, which it hardly squeezes, that allows several times the step that `build` foresees.
 """
 
 import time
@@ -17,13 +21,18 @@ from tissuejax.errors import InputError, UnstableSimulation
 from tissuejax.experiments.probing import assembled
 from tissuejax.surrogate.ramp import Matter, bare_setup
 from tissuejax.surrogate.site_mesh import Grid, geometry, topology
+from tissuejax.tled import contact, internal
+from tissuejax.tled.build import SQUEEZED
 from tissuejax.tled.scene import Scene
 from tissuejax.tled.simulate import COMPILER_OPTIONS
+from tissuejax.tled.stable import fastest
 from tissuejax.tled.step import Drive, Machine, State, advance, machine
 from tissuejax.tled.step import start as begin
 
 CALL = 1e-3  # s of life a call, at least one step
 UNROLLED = 4  # steps of a call that are written out one after another: a loop costs a third of so small a step
+PRESSING, LOOKS = 0.05, 4  # m/s of the press in which the step is tried, and depths at which it is looked at
+TRIES = 6  # steps that are tried, each at most half of the one before
 PATIENCE = 2.0  # s that measuring the pace takes at most
 SLOWEST = 1.25  # times life that a scene must reach: the page and the machine want something too
 
@@ -64,6 +73,26 @@ def calling(made: Machine, steps: int):
     return jax.jit(go, compiler_options=COMPILER_OPTIONS, donate_argnums=0)
 
 
+@jax.jit
+def borne(made: Machine, state: State, centre: Float[jax.Array, "3"]) -> Float[jax.Array, ""]:
+    """The greatest stable step of a pressed body as it is, s."""
+    scene = made.scene
+
+    def resisting(u):
+        inner = internal.forces(scene, made.mesh, u, state.history, 0.0)[0]
+        return inner - contact.forces(scene.probe, made.patch, u, centre, state.grip).nodal
+
+    omega = fastest(resisting, made.mass, made.hold.held, state.u)
+    xi = 0.5 * omega * scene.settings.stiffness_damping
+    return 2 / omega * (jnp.sqrt(1 + xi * xi) - xi)
+
+
+def shortened(scene: Scene, steps: int) -> Scene:
+    """The scene with so many steps a call; the static mass of its contact goes with the step's square."""
+    share = scene.clock.steps / steps
+    return scene.put({"clock.steps": steps, "probe.mass": scene.probe.mass * share**2})
+
+
 def _copy(state: State) -> State:
     return jax.tree.map(jnp.array, state)
 
@@ -87,17 +116,57 @@ class Direct:
     """TLED under a hand.
 
     Attributes:
-        call: s of life that one call covers. force: N, mean over the last call. displacement: of the nodes, m.
+        call: s of life that one call covers. step: s. force: N, mean over the last call. gap: between ball and tissue
+        before it is touched, m. displacement: of the nodes, m.
     """
 
-    def __init__(self, matter: Matter, grid: Grid, place):
-        self.scene = direct_scene(matter, grid, place)
-        self.step = float(self.scene.clock.step)
-        self.steps = max(1, int(np.ceil(CALL / self.step - 1e-9)))
+    def __init__(self, scene: Scene, depth: float = 0.0):
+        """Make ready and find the step.
+
+        Args:
+            depth: to which the tissue will be pressed, m; 0: the scene's own step is taken as it is.
+
+        Raises:
+            UnstableSimulation: no step was short enough.
+        """
+        for _ in range(TRIES):
+            self._take(scene)
+            worst = self._worst(depth) if depth > 0 else np.inf
+            if self.step <= SQUEEZED * worst:
+                self.home()
+                return
+            needed = np.ceil(self.step / (SQUEEZED * worst)) if worst > 0 else 2
+            scene = shortened(scene, int(scene.clock.steps * max(2, needed)))
+        raise UnstableSimulation(f"no step was short enough to press {1e3 * depth:.1f} mm deep; take a smaller --depth")
+
+    def _take(self, scene: Scene) -> None:
+        self.scene = scene
+        self.step = float(scene.clock.step)
+        self.steps = max(1, int(np.ceil(CALL / self.step - 1e-6)))
         self.call = self.steps * self.step
-        made, self.first = made_ready(self.scene)
-        self.go = calling(made, self.steps)
-        self.state, self.force = _copy(self.first), np.zeros(3)
+        self.made, self.first = made_ready(scene)
+        self.go = calling(self.made, self.steps)
+        start = scene.probe.position[0]
+        self.gap = -float(contact.depth(scene.probe, self.made.patch, self.first.u, start))
+        self.home()
+
+    def _worst(self, depth: float) -> float:
+        """The smallest step that any depth on the way down bears, s; 0 where the press broke down."""
+        found, start = [], self.at
+        count = int(np.ceil((self.gap + depth) / PRESSING / self.call))
+        looks = {int(np.ceil(count * (k + 1) / LOOKS)) for k in range(LOOKS)}
+        for k in range(1, count + 1):
+            try:
+                self.move(start - np.array([0, 0, (self.gap + depth) * k / count]))
+            except UnstableSimulation:
+                return 0.0
+            if k in looks:
+                found.append(float(borne(self.made, self.state, jnp.asarray(self.at, self.state.u.dtype))))
+        return min(found) if np.isfinite(found).all() else 0.0
+
+    def home(self) -> None:
+        """Rested tissue, the ball where it began."""
+        self.rest()
         self.at = np.asarray(self.scene.probe.position[0], float)
 
     def rest(self) -> None:
@@ -113,8 +182,7 @@ class Direct:
         self.state, force = self.go(self.state, np.array([self.at, to], np.float32))
         self.force, self.at = np.asarray(force, float), np.asarray(to, float)
         if not np.isfinite(self.force).all():
-            self.rest()
-            self.at = np.asarray(self.scene.probe.position[0], float)
+            self.home()
             raise UnstableSimulation(
                 "the simulation broke down (pressed too fast or too deep) and was set back to rest"
             )
@@ -127,7 +195,7 @@ class Direct:
 
     def pace(self, calls: int = 400, press: float = 2e-3) -> Pace:
         """Measured: the ball is pressed in and held while calls are timed, `PATIENCE` at most; then rested again."""
-        down = self.at - np.array([0, 0, 1e-3 + press])
+        down = self.at - np.array([0, 0, self.gap + press])
         for share in np.linspace(0, 1, 50):
             self.move(self.at + (down - self.at) * share)
         spent, cpu = [], time.process_time()
@@ -136,8 +204,7 @@ class Direct:
             self.move(down)
             spent.append(time.perf_counter() - begun)
         cpu = (time.process_time() - cpu) / len(spent)
-        self.rest()
-        self.at = np.asarray(self.scene.probe.position[0], float)
+        self.home()
         ms = 1e3 * np.array(spent)
         return Pace(
             self.call / cpu, float(np.median(ms)), float(np.quantile(ms, 0.99)), len(self.scene.body.cells),
