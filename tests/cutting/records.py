@@ -53,9 +53,10 @@ TRUTH = {
 }  # fmt: skip
 
 
-def simulated(h, noise, seed=3, notch=None) -> Sample:
+def simulated(h, noise, seed=3, notch=None, truth=None) -> Sample:
     """A blade of 2 mm drawn 14 mm into a slab and half the way back, with friction: forces of a simulation with
-    elements of size `h` (m), and noise of `noise` times the greatest force."""
+    elements of size `h` (m), and noise of `noise` times the greatest force. `truth`: what differs from `TRUTH`."""
+    truth = TRUTH | (truth or {})
     time, x = strokes(-0.001, 0.014, 0.008, rate=40.0)
     more = {} if notch is None else {"notch": notch}
 
@@ -66,8 +67,8 @@ def simulated(h, noise, seed=3, notch=None) -> Sample:
 
     p = predictor(
         model(effect("blade-friction")), made(0 * x + 0.1, 1e-3), by="simulation", settings=CuttingSettings(h=h),
-        start=TRUTH,
+        start=truth,
     )  # fmt: skip
-    force = np.asarray(p.predict(TRUTH)["r"].channels["cutting_force"].values)
+    force = np.asarray(p.predict(truth)["r"].channels["cutting_force"].values)
     std = noise * float(force.max())
     return made(force + std * np.random.default_rng(seed).standard_normal(len(force)), std)
