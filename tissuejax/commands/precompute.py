@@ -9,7 +9,7 @@ import numpy as np
 
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.tissue_given import add_tissue, tissue
-from tissuejax.errors import InputError
+from tissuejax.errors import InputError, NotConverged
 from tissuejax.progress import for_terminal
 from tissuejax.surrogate import store
 from tissuejax.surrogate.places import Box, whole_top
@@ -70,9 +70,11 @@ command is given again. Softening, a moving or sliding base and escaping fluid c
         out = given.out or Path("out") / f"{name}.play.h5"
         keep = out.with_name(out.name + ".sites")
         wanted = None if given.error is None else given.error / 100
-        made = precompute(
-            matter, box, Grid(counts_of(given.mesh), matter.radius), wanted, keep, for_terminal(), given.processes
-        )
+        grid = Grid(counts_of(given.mesh), matter.radius)
+        try:
+            made = precompute(matter, box, grid, wanted, keep, for_terminal(), given.processes)
+        except NotConverged as fault:
+            raise InputError(f"{fault}; finished sites are kept in {keep}, for a command like this one") from fault
         made.record["sample"] = name
         store.write(made, out)
         shutil.rmtree(keep, ignore_errors=True)
