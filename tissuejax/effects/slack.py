@@ -12,10 +12,11 @@ from tissuejax.parameters import Parameter
 
 
 class Slack(Effect):
-    """Specimen's strain is the recorded one short of `gap`, to the side of its sign, and zero inside the gap.
+    """Specimen's strain is the recorded one short of `gap`, and zero inside the gap; or it is ahead of it by `preload`.
 
-    strain is stretch - 1 or shear; play acts in tension and in compression alike. With `roundness` rho > 0 the onset is
-    gradual: gap (1 - exp(-(|strain|/gap)^(1/rho)))^rho is lost, a toe region of exponential form at 1.
+    strain is stretch - 1 or shear; play acts to the side of its sign, in tension and in compression alike. With
+    `roundness` rho > 0 the onset is gradual: gap (1 - exp(-(|strain|/gap)^(1/rho)))^rho is lost, a toe region of
+    exponential form at 1.
 
     The other way round, a recording that is set to zero at a threshold of force begins with a specimen that is loaded:
     of length 1 + `preload` (1 - `preload` where it is pressed) times that at rest, which multiplies every stretch.
