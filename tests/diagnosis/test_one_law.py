@@ -7,7 +7,7 @@ from tissuejax.diagnosis.judgement.blocks import blocks, series
 from tissuejax.diagnosis.material import MaterialBench, strain_states
 from tissuejax.energies.catalogue import energy
 from tissuejax.energies.hgo import HolzapfelGasserOgden
-from tissuejax.estimation.discrepancy import discrepancy
+from tissuejax.estimation.discrepancy import Series, discrepancy, loading_states
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 TIME = np.linspace(0.02, 1.0, 40)
@@ -66,6 +66,17 @@ def test_where_the_strain_is_one_the_law_lacks_one_share_whatever_the_test():
     assert share[one] == pytest.approx(share[other], abs=0.02)
     assert np.ptp(share) > 0.1
     assert np.all(shared[near] > 0.99)
+
+
+def test_a_specimen_of_its_own_is_isotropic_too():
+    """Both directions of one test share what is its own: at equal stretches they can't differ, as fibres make them."""
+    t = np.linspace(0.0, 0.3, 30)
+    both = np.stack([t, t], axis=1)
+    pulled = [Series("equibiaxial", "extension", t, both, loading_states(t), 1.0) for _ in range(2)]
+    other = [Series("again", "extension", t, both, loading_states(t), 1.0)]
+    own = next(p for p in discrepancy([*pulled, *other], np.ones(90)).about(np.ones(90)) if p.name == "own law").factor
+    np.testing.assert_allclose(own[:30], own[30:60], atol=1e-9)
+    assert not np.any(own[:60] @ own[60:].T)
 
 
 def test_a_law_with_fibres_has_one_for_each_axis():

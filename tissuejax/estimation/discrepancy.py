@@ -25,7 +25,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.linalg import block_diag
 
 LAW = {"law": 0.5, "fine law": 0.12}  # correlation lengths, of the range of strain
 ALIKE = 0.4  # correlation length of hysteresis, of the range of strain
@@ -112,7 +111,7 @@ class Discrepancy:
     Attributes:
         laws: factors of the laws about a stress of one, by name.
         belongs: a column for every recording, one where a row belongs to it.
-        own: factors of a law of each series' own, about a stress of one.
+        own: factors of a law of each recording's own, about a stress of one; its series of a mode share it.
         turning: factors of hysteresis about a peak of one, by name.
         fixed: the parts that don't depend on the prediction.
     """
@@ -141,12 +140,12 @@ def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"]) -> Dis
     """
     of = np.repeat(np.arange(len(series)), [len(s.time) for s in series])
     states = np.concatenate([s.states for s in series])
-    modes = [np.flatnonzero([s.mode == m for s in series]) for m in dict.fromkeys(s.mode for s in series)]
 
-    def shared(length: float) -> Float[np.ndarray, "N r"]:
-        """Factors of all modes side by side."""
+    def shared(length: float, labels: Sequence[Hashable]) -> Float[np.ndarray, "N r"]:
+        """Factors side by side, of the series of each label: smooth in strain, one function for all of them."""
         columns = []
-        for members in modes:
+        for label in dict.fromkeys(labels):
+            members = np.array([i for i, other in enumerate(labels) if other == label])
             own = smooth_factor(np.concatenate([series[i].strain for i in members]), length)
             whole = np.zeros((len(of), own.shape[1]))
             whole[np.isin(of, members)] = own
@@ -155,7 +154,8 @@ def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"]) -> Dis
 
     recordings = list(dict.fromkeys(s.recording for s in series))
     belongs = np.array([recordings.index(s.recording) for s in series])[of]
-    near, out = shared(ALIKE), []
+    modes = [s.mode for s in series]
+    near, out = shared(ALIKE, modes), []
     turning = tuple((f"hysteresis, {shape}", near * states[:, i, None]) for i, shape in enumerate(STATES))
     for name, time in SLOW.items():
         blocks = []
@@ -168,6 +168,6 @@ def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"]) -> Dis
         own = sigma[of == i]
         scatter.append(np.diag((s.peak * own / max(float(np.median(own)), 1e-300)) ** 2))
     out.append(Part("white", "white", within=tuple(scatter)))
-    laws = tuple((name, shared(length)) for name, length in LAW.items())
-    own = block_diag(*(smooth_factor(s.strain, LAW["law"]) for s in series))
+    laws = tuple((name, shared(length, modes)) for name, length in LAW.items())
+    own = shared(LAW["law"], [(s.recording, s.mode) for s in series])
     return Discrepancy(laws, (belongs[:, None] == np.arange(len(recordings))).astype(float), own, turning, tuple(out))
