@@ -45,8 +45,8 @@ def write(folder: Path, found: dict) -> Path:
         if plain:
             tables.append({"title": name, "columns": [k.replace("_", " ") for k in plain], "rows": rows})
         if "differences" in part:
-            rows = [[k, f"{v:.2g}"] for k, v in part["differences"].items()]
-            columns = ["parameter and relative step", "derivative against central difference"]
+            rows = [[k, f"{v:.2g}", f"{part['differences_of_means'][k]:.2g}"] for k, v in part["differences"].items()]
+            columns = ["parameter and relative step", "derivative against central difference", "of means over 1 mm"]
             tables.append({"title": "derivatives, step by step", "columns": columns, "rows": rows})
     shown = []
     if "recovery" in found:

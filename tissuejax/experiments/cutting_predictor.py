@@ -178,12 +178,14 @@ class CuttingPredictor(Predictor):
             return
         scene = self.slices[name].scene
         x, y, _ = 1e3 * np.asarray(scene.body.points)[np.asarray(scene.body.cells)[int(ran.element)]].mean(0)
+        clock, path = scene.clock, self.paths_of[name]
+        ran_for = float(clock.interval) * (int(ran.failed) + 1)  # on the run's own clock
+        when = float(np.interp(ran_for, self.slices[name].runtime, path.time))
+        reached = float(np.interp(when, path.time, path.x))
         raise UnstableSimulation(
-            f"recording {name}: an element inverted at ({x:.1f}, {y:.1f}) mm from the entry, by frame "
-            f"{int(ran.failed)}: "
-            "take smaller elements (--h), tissue that resists compression (volumetric.K ten times the shear "
-            "modulus), or "
-            "a strength that the mesh can carry (`tissuejax cut resolve`)"
+            f"recording {name}: an element inverted at ({x:.1f}, {y:.1f}) mm from the entry, by {when:.3g} s, when the "
+            f"edge stood at {1e3 * reached:.1f} mm: take smaller elements (--h), tissue that resists compression "
+            "(volumetric.K ten times the shear modulus), or a strength that the mesh carries (`tissuejax cut resolve`)"
         )
 
 

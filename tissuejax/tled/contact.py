@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from tissuejax.tled.internal import barrier
+from tissuejax.tled.internal import add, barrier, take
 from tissuejax.tled.scene import Probe, Scene
 
 BONDED = 4.0  # a point that comes as near as zero gap is bonded by 98 %, however lightly it is pressed
@@ -75,11 +75,18 @@ class Touch(NamedTuple):
 
 
 def places(patch: Patch, u: Float[Array, "3 N"], centre: Float[Array, " 3"], shape: np.ndarray):
-    """Contact points relative to the probe's reference point, three arrays (q, P)."""
-    x = patch.x + u.at[:, patch.nodes].get(mode="promise_in_bounds")
-    weights = jnp.asarray(shape, x.dtype)[:, :, None]
-    at = sum(weights[:, a] * x[:, None, a] for a in range(shape.shape[1])) - centre[:, None, None]
-    return tuple(barrier(at))
+    """Contact points relative to the probe's reference point, three arrays (q, P); one component at a time, see
+    `internal.take`."""
+    weights = jnp.asarray(shape, u.dtype)[:, :, None]
+    corners = barrier(tuple(x + take(row, patch.nodes) for x, row in zip(patch.x, u, strict=True)))
+    return barrier(
+        tuple(sum(weights[:, a] * x[a] for a in range(len(x))) - c for x, c in zip(corners, centre, strict=True))
+    )
+
+
+def total(x: Float[Array, "r n"]) -> Float[Array, ""]:
+    """Sum in two steps, first down the columns: in one long sum each addition waits for the one before."""
+    return jnp.sum(barrier(jnp.sum(x, 0)))
 
 
 def _softplus(z):
@@ -91,7 +98,7 @@ def forces(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Arr
     shape, _ = quadrature(patch.nodes.shape[0])
     x = places(patch, u, centre, shape)
     gap, normal = probe.shape.distance(x)
-    pressure = probe.penalty * probe.softness * _softplus(-gap / probe.softness)
+    pressure = barrier(probe.penalty * probe.softness * _softplus(-gap / probe.softness))  # once, not once a component
     push, bond = pressure, grip.bond
     if probe.adhesion is not None:
         touched = jax.nn.sigmoid(BONDED - gap / probe.softness)
@@ -102,16 +109,15 @@ def forces(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Arr
     rubbed = None
     if probe.friction is not None:
         drag, anchor, lost = _friction(probe, x, normal, pressure, anchor)
-        rubbed = jnp.sum(lost * probe.area)
+        rubbed = total(lost * probe.area)
         traction = tuple(t + d for t, d in zip(traction, drag, strict=True))
-    f = barrier(jnp.stack(traction) * probe.area)  # (3, q, P)
-    arm = barrier(jnp.stack(x))
-    total = jnp.sum(f, (1, 2))
-    torque = jnp.sum(jnp.roll(arm, -1, 0) * jnp.roll(f, 1, 0) - jnp.roll(arm, 1, 0) * jnp.roll(f, -1, 0), (1, 2))
-    weights = jnp.asarray(shape, f.dtype)[:, :, None]
-    at_nodes = barrier(sum(weights[q] * f[:, q][:, None] for q in range(shape.shape[0])))
-    nodal = jnp.zeros_like(u).at[:, patch.nodes].add(at_nodes, mode="promise_in_bounds")
-    return Touch(nodal, -total, -torque, Grip(anchor, bond), rubbed)
+    f = barrier(tuple(t * probe.area for t in traction))
+    force = jnp.stack([total(t) for t in f])
+    torque = jnp.stack([total(x[i - 2] * f[i - 1] - x[i - 1] * f[i - 2]) for i in range(3)])
+    weights = jnp.asarray(shape, u.dtype)[:, :, None]
+    at_nodes = barrier(tuple(sum(weights[q] * t[q] for q in range(shape.shape[0])) for t in f))
+    nodal = jnp.stack(barrier(tuple(add(t, patch.nodes, u.shape[1]) for t in at_nodes)))
+    return Touch(nodal, -force, -torque, Grip(anchor, bond), rubbed)
 
 
 def _friction(probe, x, normal, pressure, anchor):
@@ -119,13 +125,13 @@ def _friction(probe, x, normal, pressure, anchor):
     energy that they gave up by sliding, J/m^2."""
     stretch = tuple(a - b for a, b in zip(x, anchor, strict=True))
     along = sum(s * n for s, n in zip(stretch, normal, strict=True))
-    stretch = tuple(s - along * n for s, n in zip(stretch, normal, strict=True))
+    stretch = barrier(tuple(s - along * n for s, n in zip(stretch, normal, strict=True)))
     square = sum(s * s for s in stretch)
     some = square > 0
     length = jnp.sqrt(jnp.where(some, square, 1.0))
     spring = probe.penalty / (1.0 + probe.penalty * probe.give)
     limit = probe.friction * pressure / spring
-    kept = jnp.where(some, jnp.minimum(1.0, limit / length), 1.0)
+    kept = barrier(jnp.where(some, jnp.minimum(1.0, limit / length), 1.0))
     kept_stretch = tuple(kept * s for s in stretch)
     anchor = tuple(a - s for a, s in zip(x, kept_stretch, strict=True))
     lost = spring * square * kept * (1.0 - kept)  # traction times slide; none where nothing presses
@@ -152,7 +158,9 @@ def energy(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Arr
     z = -gap / probe.softness
     # integral of softplus is -Li2(-exp(z)); with Li2's reflection for z > 0 only small arguments remain
     small = jnp.exp(-jnp.abs(z))
-    series = sum((-1) ** (k + 1) * small**k / k**2 for k in range(1, 40))
+    series = jnp.zeros_like(small)
+    for k in range(39, 0, -1):  # Horner
+        series = small * ((-1) ** (k + 1) / k**2 + series)
     integral = jnp.where(z > 0, z * z / 2 + jnp.pi**2 / 6 - series, series)
     return jnp.sum(probe.area * probe.penalty * probe.softness**2 * integral)
 

@@ -161,12 +161,12 @@ def _spent(m: Machine, lost, rubbed, inner, f, v, pushed) -> Spent:
     scene, zero = m.scene, jnp.zeros_like(lost)
     h, mean = scene.clock.step, 0.5 * (v + pushed)
     free = jnp.where(m.hold.held, 0.0, mean)
-    damping = scene.settings.mass_damping * h * jnp.sum(m.mass * free * free)
+    damping = scene.settings.mass_damping * h * contact.total(m.mass * free * free)
     shove = zero
     if scene.support.displacement is not None:
         carried = jnp.where(m.hold.held, mean * (m.mass * (pushed - v) - h * f), 0.0)
-        shove = jnp.sum(carried)
-    return Spent(lost, zero if rubbed is None else rubbed, damping, h * jnp.sum(inner * mean), shove)
+        shove = contact.total(carried)
+    return Spent(lost, zero if rubbed is None else rubbed, damping, h * contact.total(inner * mean), shove)
 
 
 def _touch(probe, patch, u, centre, grip):
