@@ -68,7 +68,7 @@ class DiagnosisRemainder(Plot):
                 colour = HELD if name.removeprefix("time/") in held else FAINT
                 axes[2].plot(curve["x"], np.array(curve["value"]) / factor, color=colour, linewidth=1.2)
         axes[0].set_xlabel(drive)
-        axes[1].set_xlabel("its rate (1/s)")
+        axes[1].set_xlabel("its rate (m/s)" if drive.endswith("(m)") else "its rate (1/s)")
         axes[2].set_xlabel("time (s); a curve a recording, orange held out")
         axes[0].set_ylabel(f"{found.channel.replace('_', ' ')}{label(unit)}")
         return figure
