@@ -145,7 +145,8 @@ def _call(cells, *arguments, kernel: Kernel, batched, count: int):
         name = kernel.name(str(arguments[0].dtype), batched)
     except (Untold, NotCompiled):  # a derivative may have operations that the function has not
         return plain(cells, *arguments, kernel=kernel, batched=batched, count=count)
-    return jax.ffi.ffi_call(name, _avals(kernel, batched, count, cells, arguments))(cells, *arguments)
+    avals = _avals(kernel, batched, count, cells, arguments)
+    return jax.ffi.ffi_call(name, avals)(cells.astype(jnp.int32), *arguments)  # 32 bits are what the program reads
 
 
 def plain(cells, *arguments, kernel: Kernel, batched, count: int) -> list[Any]:
