@@ -77,7 +77,7 @@ def write(folder: Path, found: dict) -> Path:
         curves = [(f"h {r['h_mm']:g} mm", *_means(*r["series"])) for r in found["meshes"]["runs"]]
         figure = _curves(curves, "edge of the blade (mm)", "force per depth, over 1 mm (N/m)")
         shown += [_kept(folder, "entry", "A blade goes into an uncut front: three meshes, one law.", figure)]
-    if "source" in found:
+    if "series" in found.get("source", {}):  # none where the run broke down
         at, against, along = found["source"]["series"]
         curves = [("against the motion", at, against), ("along the blade", at, along)]
         level, said = found["source"]["published_peak_N_m"], "published strength times thickness"
