@@ -5,7 +5,6 @@ tissuejax study fits/slow-motion            about two minutes of one core
 """
 
 import runpy
-import time
 from pathlib import Path
 
 import jax
@@ -14,21 +13,18 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tissuejax.energies import catalogue
-from tissuejax.energies.reduced_polynomial import ReducedPolynomial
-from tissuejax.energies.volumetric import Quadratic
 from tissuejax.experiments.probing import assembled
 from tissuejax.mesh.columns import box, lobe_of_mesh
 from tissuejax.model import Model
 from tissuejax.storage import write_json
-from tissuejax.surrogate.live.direct import calling, made_ready
 from tissuejax.surrogate.ramp import Matter, bare_setup, ramp
 from tissuejax.surrogate.site_mesh import Grid, geometry, topology
-from tissuejax.tled import build
 from tissuejax.tled.simulate import run
 
 jax.config.update("jax_enable_x64", True)
+jax.config.update("jax_cpu_enable_async_dispatch", False)  # as `play --direct`: a short call is not handed on
 
-spheres = runpy.run_path(str(Path(__file__).with_name("spheres.py")))
+spheres, direct = (runpy.run_path(str(Path(__file__).with_name(f"{name}.py"))) for name in ("spheres", "direct"))
 SIZE, RADIUS, TOP, DEPTH = (0.06, 0.06, 0.02), 4.75e-3, 0.02, 9e-3
 SPEEDS = (0.03, 0.1, 0.2, 0.46)  # m/s that the tissue sees; 0.46 is a hand at 10 mm/s in the slowest contact
 DAMPING = 50.0  # 1/s, of the source's file
@@ -38,7 +34,6 @@ COARSE, FINER = (6, 6, 2), (10, 10, 3)  # elements of 10 mm, as in the source's 
 RATES = {"cube, neo-Hookean": 301, "cube, polynomial": 283, "liver": 234, "liver and torso": 170, "collision on": 137,
          "in contact, fastest": 50, "in contact, slowest": 23}  # fmt: skip
 STEP = 0.95e-3
-POLYNOMIAL = dict(C10=781.898, C20=-747.631, C30=426.135, C40=122.701)  # in vivo 3, of the source's kernel
 
 
 def matter(radius: float) -> Matter:
@@ -73,45 +68,6 @@ def pressed(speed: float) -> dict:
         "depth": at, "force": force, "mean": float(force[deep].mean()), "peak": float(force.max()),
         "work": float(np.trapezoid(force, at)), "without_contact": float((force[at > 0.5e-3] < 1e-4).mean()),
     }  # fmt: skip
-
-
-def bodies() -> dict:
-    """The source's cube and a lobe as large as its liver (708 hexes there), with and without a ball pressed into it."""
-    values, bulk = POLYNOMIAL, dict(K=20e3)
-    times = np.arange(60) / 60
-    position = np.stack([0 * times, 0 * times, 0.04 + 0.0048 - 0.008 * times], 1)
-    cube = build.scene(box((0.1, 0.1, 0.1), (10, 10, 10)), ReducedPolynomial(order=4), Quadratic(), values, bulk,
-                       1060.0, times)  # fmt: skip
-    lobe = build.scene(box((0.18, 0.115, 0.04), (14, 10, 5)), ReducedPolynomial(order=4), Quadratic(), values, bulk,
-                       1060.0, times, times, position, RADIUS)  # fmt: skip
-    return {"cube": cube, "lobe, nothing near": lobe.put({"probe": None}), "lobe, in contact": lobe}
-
-
-def paces(repeats: int = 5) -> dict:
-    """Steps a second of one core and the pace of life, of steps one call each (as a loop of 1 kHz needs them)."""
-    found = {}
-    for name, scene in bodies().items():
-        scene = scene.cast(jnp.float32)
-        machine, state = made_ready(scene)
-        go, step = calling(machine, 1), float(scene.clock.step)
-        down = np.tile([0.0, 0.0, 0.04 + RADIUS - 4e-3], (2, 1)).astype(np.float32)
-        spent, cpu = [], []
-        for _ in range(repeats):
-            begun = time.process_time()
-            for _ in range(300):
-                one = time.perf_counter()
-                state, force = go(state, down)
-                np.asarray(force)
-                spent.append(time.perf_counter() - one)
-            cpu.append((time.process_time() - begun) / 300)
-        ms = 1e3 * np.array(spent[300:])
-        found[name] = {
-            "elements": len(scene.body.cells), "step_ms": 1e3 * step, "steps_per_s": 1 / min(cpu),
-            "times_life": step / min(cpu), "call_p50_ms": float(np.median(ms)),
-            "call_p99_ms": float(np.quantile(ms, 0.99)), "force_N": np.asarray(force, float),
-        }  # fmt: skip
-    on, off = (1 / found[k]["steps_per_s"] for k in ("lobe, in contact", "lobe, nothing near"))
-    return {"bodies": found, "contact_share": 1 - off / on}
 
 
 def draw(runs: dict, truth: np.ndarray, ball: np.ndarray, coarse: dict) -> Figure:
@@ -160,7 +116,7 @@ def main(folder: Path) -> str:
     }  # fmt: skip
     write_json(folder / "result.json", result)
     draw(runs, truth, ball, result["contact"][0]).savefig(folder / "figures" / "slow.png", dpi=110)
-    result["ours"] = paces()
+    result["ours"] = direct["paces"](matter(RADIUS), RADIUS)
     write_json(folder / "result.json", result)
     last, at = speeds[f"{1e3 * SPEEDS[-1]:g} mm/s"], list(DEPTHS).index(2e-3)
     coarse = result["contact"][0]
