@@ -16,6 +16,7 @@ from tissuejax.tled.simulate import run
 MATERIAL = published("ex-vivo-ogden")
 K, DENSITY, G = 20e3, 1060.0, 9.81  # Pa (285 times the shear modulus), kg/m^3, m/s^2
 DEEPEST, SPEED = 15.5e-3, 1.25e-3  # m, m/s
+START = 0.4  # s, when the probe has come down to the surface
 # The law is hundreds of times stiffer where it is pressed than at rest, and the hourglass control knows the rest only:
 # with 0.3 elements under the probe fold up (their stress point does not feel it) and the force collapses past 11 mm.
 HOURGLASS = 10.0
@@ -60,22 +61,27 @@ def sag(geometry, u) -> dict:
     }
 
 
-def pressed(geometry, u, radius: float, compression: float = COMPRESSION, hourglass: float = HOURGLASS) -> dict:
-    """Force of the probe at each of the forty depths, N, and how the run went. A hemisphere under a shank."""
+def press(geometry, u, radius: float, compression: float = COMPRESSION, hourglass: float = HOURGLASS):
+    """The scene of the press, from `START` on at `SPEED`. A hemisphere under a shank."""
     middle = np.linalg.norm(np.asarray(geometry.points)[:, :2], axis=1) < 1e-6
     height = float((np.asarray(geometry.points) + u)[middle, 2].max())
-    start, end, depth = 0.4, 0.4 + DEEPEST / SPEED, DEEPEST
-    time = np.array([0.0, start, end])
+    end, depth = START + DEEPEST / SPEED, DEEPEST
+    time = np.array([0.0, START, end])
     tip = height + radius + 5e-4 - np.array([0.0, 5e-4, 5e-4 + depth])
     path = np.stack([np.zeros(3), np.zeros(3), tip], 1)
     times = (np.arange(160) + 0.5) * end / 160
-    scene = build.scene(
+    return build.scene(
         geometry, MATERIAL.energy, Quadratic(), MATERIAL.constants, dict(K=K), DENSITY, times, time, path,
         shape=Hemisphere(radius), compression=compression, gravity=(0, 0, -G), settled=u, hourglass=hourglass,
     )  # fmt: skip
+
+
+def pressed(geometry, u, radius: float, compression: float = COMPRESSION, hourglass: float = HOURGLASS) -> dict:
+    """Force of the probe at each of the forty depths, N, and how the run went."""
+    scene = press(geometry, u, radius, compression, hourglass)
     out = run(scene.cast(jnp.float32))
-    depths = np.arange(1, STEPS + 1) * depth / STEPS
-    force = np.interp(start + depths / SPEED, np.asarray(out.time), np.asarray(out.force)[:, 2])
+    depths = np.arange(1, STEPS + 1) * DEEPEST / STEPS
+    force = np.interp(START + depths / SPEED, np.asarray(out.time), np.asarray(out.force)[:, 2])
     return {
         "depth_mm": (1e3 * depths).tolist(),
         "force_N": force.tolist(),
