@@ -10,7 +10,6 @@ modulus (`tissuejax cut fit` with the measured one gives the number).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
@@ -24,7 +23,6 @@ from tissuejax.effects.catalogue import effects, suited
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.volumetric import Quadratic
 from tissuejax.errors import unknown
-from tissuejax.estimation.discrepancy import Discrepancy, Part
 from tissuejax.experiments.cutting_record import FORCE, steady
 from tissuejax.experiments.predictor import predictor
 from tissuejax.model import Model
@@ -113,27 +111,6 @@ class CuttingBench(Bench):
                 out[s.rows] = np.asarray(self._programs[key](vector))[self._kept[s.recording]]
         self.spent += 1.0 if kind == "run" else 10.0
         return out
-
-
-@dataclass(frozen=True)
-class CutDiscrepancy:
-    """What the model leaves of cuts though no effect is missing: a gain of each stroke, slow wander, scatter.
-
-    Nothing that depends on the place: what tissue is like along the path is itself an effect (`toughness-map`), and a
-    rest that could take it would take all that a blade meets on its way with it.
-    """
-
-    belongs: Float[np.ndarray, "N R"]
-    fixed: tuple[Part, ...]
-
-    @classmethod
-    def of(cls, general: Discrepancy) -> "CutDiscrepancy":
-        """Those parts of a discrepancy in place of stretch that are none of place."""
-        return cls(general.belongs, tuple(p for p in general.fixed if p.family != "hysteresis"))
-
-    def about(self, prediction: Float[np.ndarray, " N"]) -> tuple[Part, ...]:
-        """The parts beside this prediction, N; always in the same order."""
-        return (Part("gain", "gain", prediction[:, None] * self.belongs), *self.fixed)
 
 
 def strokes_to_settle(sample: Sample, bench: CuttingBench, verdict) -> list[str]:

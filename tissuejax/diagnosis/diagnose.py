@@ -10,7 +10,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tissuejax.cache.programs import keep_programs
-from tissuejax.diagnosis.cutting import CutDiscrepancy, CuttingBench, strokes_to_settle
+from tissuejax.diagnosis.cutting import CuttingBench, strokes_to_settle
 from tissuejax.diagnosis.foreseen import OPEN, foreseen
 from tissuejax.diagnosis.judgement.answer import Answered, answer, evidence_file
 from tissuejax.diagnosis.judgement.blocks import blocks, driven_states, series
@@ -160,7 +160,6 @@ def diagnose(
             cut = blocks(whole)
             states = strain_states(whole) if kind == "homogeneous" else driven_states(whole)
             of = discrepancy(series(whole, cut, states), cut.spread(whole.sigma))
-            of = CutDiscrepancy.of(of) if kind == "cutting" else of
         found = answer(bench, whole, cut, of, effort, noted)
         made = {"homogeneous": _material, "probing": _probing, "cutting": _cutting}[kind](sample, energy, base, found)
     if found.evidence.exhausted:
