@@ -193,7 +193,7 @@ def test_the_mass_over_one_amplitude_is_its_integral(name, width, chance):
     part, priors = [p for p in parts if p.name == name], Widths(np.array([width]), np.array([chance]))
     start, _ = amplitudes(linear, part, priors.widest, blocked, priors.width**2)
     v, m = amplitudes(linear, part, priors, blocked, start)
-    a = np.concatenate([np.linspace(0, 0.02, 1000), np.linspace(0.0201, 0.3, 1400)])
+    a = np.concatenate([np.linspace(0, 0.02, 200), np.linspace(0.0202, 0.3, 280)])
     logs = np.array([marginal(linear, part, np.array([x**2]), blocked).value for x in a])
     density = (1 - chance) * halfnorm(scale=width).pdf(a) + chance * halfnorm(scale=10 * width).pdf(a)
     exact = math.log(np.trapezoid(np.exp(logs - m.value) * density, a))
