@@ -23,8 +23,10 @@ lint: $(STAMP)
 types: $(STAMP)
 	$(BIN)/basedpyright --pythonpath $(BIN)/python
 
-test: lint types docs  # a thread a worker: small matrices on two threads each, twice over, wait for one another
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 -q --durations=15
+# A thread a worker: small matrices on two threads each, twice over, wait for one another. A file stays with one
+# worker, which compiles what its tests share once.
+test: lint types docs
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -q --durations=15
 
 slow: $(STAMP)
 	$(BIN)/python -m pytest -q -m slow

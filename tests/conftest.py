@@ -1,6 +1,8 @@
-"""Shared by all tests: double precision, the places of outside data, small seeded randomness."""
+"""Shared by all tests: double precision, one folder of compiled programs a run, outside data, seeded randomness."""
 
 import os
+import shutil
+import tempfile
 from pathlib import Path
 
 import jax
@@ -13,7 +15,24 @@ jax.config.update("jax_enable_x64", True)
 settings.register_profile("suite", deadline=None, derandomize=True)
 settings.load_profile("suite")
 
+PROGRAMS = "JAX_COMPILATION_CACHE_DIR"
+
 SHARED = Path(os.environ.get("TISSUEJAX_SHARED", Path(__file__).resolve().parents[2] / "shared"))
+
+
+def pytest_configure(config):
+    """What one worker, or a program that a test starts, has compiled in this run the others need not compile again."""
+    if PROGRAMS in os.environ or hasattr(config, "workerinput"):
+        return
+    config.programs = tempfile.mkdtemp(prefix="tissuejax-programs-")
+    os.environ |= {PROGRAMS: config.programs, "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.3"}
+    jax.config.update("jax_compilation_cache_dir", config.programs)
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
+
+
+def pytest_unconfigure(config):
+    if hasattr(config, "programs"):
+        shutil.rmtree(config.programs, ignore_errors=True)
 
 
 def outside(*parts: str) -> Path:

@@ -54,6 +54,30 @@ def test_memory_needs_a_hold_or_a_way_back(stretch, seen):
     assert names(stretch) & {"viscoelasticity", "softening", "permanent-set", "hysteresis"} == seen
 
 
+SLOW = ("effects.drift.rate", "effects.compressibility.drained")
+
+
+@pytest.mark.parametrize(("stretch", "seen"), [(RAMP, set()), (HOLD, set(SLOW)), (CYCLE, set(SLOW))])
+def test_what_goes_slowly_with_time_needs_a_time_that_is_no_strain(stretch, seen):
+    drift = [
+        Candidate("drift", ("effects.drift.offset",)),
+        Candidate("drift", ("effects.drift.offset", SLOW[0]), form="rate"),
+    ]
+    draining = Candidate("compressibility", ("effects.compressibility.immediate", SLOW[1]))
+    kept, _ = offered(sample(stretch, kind="pure-shear"), {c.key: c for c in (*drift, draining)})
+    paths = {p for c in kept.values() for p in c.paths}
+    assert paths & set(SLOW) == seen
+    assert {"effects.drift.offset", "effects.compressibility.immediate"} <= paths
+
+
+def test_a_drift_along_a_ramp_is_a_strain_energy():
+    """On a ramp at one rate c t is c (l - 1) / rate, whose primitive in l is an energy; with a hold it is none."""
+    for stretch, alike in ((RAMP, True), (HOLD, False)):
+        drift = 7.0 * TIME
+        fit = np.polynomial.Polynomial.fit(stretch, drift, 3)(stretch)
+        assert (np.max(np.abs(fit - drift)) < 1e-6) == alike
+
+
 def test_what_remembers_the_way_is_a_strain_energy_until_it_comes_back():
     """Set and softening against a law of strain alone: alike on a ramp at any rate, unlike on the way back."""
     on = [e for e in effects("homogeneous").values() if e.needs == "reversed"]

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tissuejax.diagnosis.bench import Candidate
-from tissuejax.diagnosis.untimed import timed, without_clock
+from tissuejax.diagnosis.untimed import timed, without_clock, without_pace
 from tissuejax.effects.catalogue import effects
 from tissuejax.recordings.recording import Recording, Sample
 
@@ -172,6 +172,8 @@ def offered(
         if names is None or own.name in names:
             kept[own.key] = own
     protocol, why = Protocol.of(sample), {}
+    if not protocol.rates:
+        kept = without_pace(kept)
     if LAW.key in kept:
         blind = [own for own in (SCATTER, HYSTERESIS) if not getattr(protocol, needs()[own.name])]
         more = {family: LAW.widens["law"] for own in blind for family in own.widens}

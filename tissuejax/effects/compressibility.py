@@ -39,6 +39,8 @@ class Compressibility(Effect):
     needs: ClassVar[str] = "constraints"
     source: ClassVar[str] = "Mow et al. 1980; Holzapfel 2000, sec. 6.4"
     amplitudes: ClassVar[tuple[str, ...]] = ("immediate", "drained")
+    timed: ClassVar[tuple[str, ...]] = ("drained", "time")
+    slow: ClassVar[tuple[str, ...]] = ("drained", "time")
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"time": (1.0, 5.0, 25.0)}
 
     @property

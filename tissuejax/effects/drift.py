@@ -30,6 +30,8 @@ class Drift(Effect):
     source: ClassVar[str] = "linear sensor model"
     order: ClassVar[int] = 0
     amplitudes: ClassVar[tuple[str, ...]] = ("offset", "rate")
+    timed: ClassVar[tuple[str, ...]] = ("rate", "settling")
+    slow: ClassVar[tuple[str, ...]] = ("rate", "settling")
     separate: bool = False
 
     @property

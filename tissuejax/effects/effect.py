@@ -36,6 +36,9 @@ class Effect(eqx.Module):
             it were fitted and its first one, or another of that unit, isn't zero; one without parameters always.
         needs: what a protocol of material tests must do to show it, a property of `diagnosis.offered.Protocol`; "" if
             nothing in particular. Where it is lacking the effect is another strain energy by its deeds, or nothing.
+        timed: parameters that act in time, so that they mean nothing where no times were recorded.
+        slow: of these, the ones that are another strain energy by their deeds where all is loaded at one rate and never
+            held: there the time is a function of the strain.
         amplitudes: parameters that are 0 at neutral; the others ("shapes") vanish with the effect.
         grid: for each shape parameter, the values that a diagnosis scans; those of a shape in Pa count in initial shear
             moduli of the base energy, so that one grid serves brain and rubber (`settings` multiplies them out).
@@ -65,6 +68,8 @@ class Effect(eqx.Module):
     source: ClassVar[str]
     amplitudes: ClassVar[tuple[str, ...]]
     needs: ClassVar[str] = ""
+    timed: ClassVar[tuple[str, ...]] = ()
+    slow: ClassVar[tuple[str, ...]] = ()
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {}
     order: ClassVar[int] = 1
     isotropic: ClassVar[bool] = True

@@ -36,6 +36,7 @@ class Periodic(Effect):
         "frequency": tuple(float(f) for f in np.concatenate([np.arange(0.06, 0.6, 0.02), np.arange(0.6, 3.0, 0.04)]))
     }
     amplitudes: ClassVar[tuple[str, ...]] = ("sin", "cos", "sin2", "cos2")
+    timed: ClassVar[tuple[str, ...]] = amplitudes
     separate: bool = True
 
     @property
