@@ -3,6 +3,7 @@
 import importlib
 import inspect
 import pkgutil
+from functools import cache
 from types import ModuleType
 from typing import Any
 
@@ -19,8 +20,13 @@ def members(package: ModuleType, kind: type) -> dict[str, type]:
     Raises:
         RuntimeError: two members share one name.
     """
+    return dict(_walked(package, tuple(package.__path__), kind))
+
+
+@cache  # a walk takes longer than a small fit
+def _walked(package: ModuleType, folders: tuple[str, ...], kind: type) -> dict[str, type]:
     found: dict[str, Any] = {}
-    for info in sorted(pkgutil.iter_modules(package.__path__), key=lambda i: i.name):
+    for info in sorted(pkgutil.iter_modules(folders), key=lambda i: i.name):
         module = importlib.import_module(f"{package.__name__}.{info.name}")
         declared: list[tuple[str, Any]] = inspect.getmembers(module, inspect.isclass)
         for _, member in declared:

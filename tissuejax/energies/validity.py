@@ -62,16 +62,15 @@ def valid_stretches(
     def inside(stretch: float) -> bool:
         return bool(energy.margin(p, along(path, jnp.asarray(stretch))) > 0)
 
-    if not inside(1.0):
+    at_rest, *ends = np.asarray(energy.margin(p, along(path, jnp.asarray((1.0, *within)))) > 0)
+    if not at_rest:
         return float("nan"), float("nan")
-    low, high = within
-    return _last_inside(inside, low), _last_inside(inside, high)
+    low, high = (end if fine else _last_inside(inside, end) for end, fine in zip(within, ends, strict=True))
+    return low, high
 
 
 def _last_inside(inside, end: float) -> float:
     """Bisection for the last stretch inside between 1 and `end`; margins fall monotonically away from rest."""
-    if inside(end):
-        return end
     good, bad = 1.0, end
     for _ in range(50):
         middle = 0.5 * (good + bad)
