@@ -1,5 +1,8 @@
 """Do the intervals hold what they promise? Simulation-based calibration of every kind, on closed-form tension tests.
 
+Evidences are calibrated by the laws they choose: of the data sets that give a law the probability 0.7, seven in ten
+should come from it (Schad et al. 2022, Psychol. Methods, doi:10.1037/met0000472).
+
 Truths are drawn from a prior, data from the textbook's formula written here (not the package's), and each truth is
 ranked among the draws of its posterior: ranks of a calibrated posterior are uniform (Talts et al. 2018,
 arXiv:1804.06788). Intervals and bands are counted: how often they hold the truth, and a value measured anew.
@@ -13,10 +16,11 @@ from pathlib import Path
 import equinox as eqx
 import numpy as np
 from matplotlib.figure import Figure
-from scipy.stats import binom, chi2
+from scipy.stats import binom, chisquare
 
 import tissuejax as tj
 from tissuejax.fitting.bands import half_width, prediction_std
+from tissuejax.fitting.evidence import evidence
 from tissuejax.fitting.least_squares import descend, fit
 from tissuejax.fitting.posterior import laplace, nuts_draws, nuts_runner
 from tissuejax.fitting.profile import profile
@@ -31,9 +35,11 @@ DATA_SETS, DRAWS, BINS, SIGMA, SEED = 200, 99, 10, 40.0, 11
 STRETCH = np.linspace(0.75, 1.3, 24)
 PRIOR = {"energy.mu": (1500.0, 350.0), "energy.b": (2.0, 0.7)}
 FEW = 3  # every third sample: eight, for two parameters and a noise that was not recorded
+SLIGHT = {"energy.mu": (1500.0, 350.0), "energy.b": (0.3, 0.3)}  # a stiffening that the noise can hide
+PARTICLES = 500
 
 
-def stress(mu: float, b: float) -> np.ndarray:
+def stress(mu: float, b: float = 0.0) -> np.ndarray:
     """Demiray 1972: nominal stress in uniaxial tension, mu exp(b (I1 - 3)) (l - l^-2)."""
     l = STRETCH
     return mu * np.exp(b * (l**2 + 2 / l - 3)) * (l - l**-2)
@@ -46,11 +52,11 @@ def data(values, every: int = 1, std: float | None = SIGMA) -> Sample:
     return Sample("sbc", {"pull": Recording("pull", "uniaxial", inputs, {"nominal_stress": channel}, {})})
 
 
-def truths(rng: np.random.Generator) -> np.ndarray:
+def truths(rng: np.random.Generator, prior=PRIOR) -> np.ndarray:
     """Parameters drawn from the prior, positive ones."""
-    means, stds = (np.array([PRIOR[p][k] for p in PRIOR]) for k in (0, 1))
+    means, stds = (np.array([prior[p][k] for p in prior]) for k in (0, 1))
     while True:
-        truth = means + stds * rng.normal(size=len(PRIOR))
+        truth = means + stds * rng.normal(size=len(prior))
         if (truth > 0).all():
             return truth
 
@@ -67,8 +73,7 @@ def posterior_ranks(rng: np.random.Generator) -> tuple[dict, dict, float]:
         measured = stress(*truth) + SIGMA * rng.normal(size=len(STRETCH))
         posed = replace(base, predictor=eqx.tree_at(lambda p: p.sample, base.predictor, data(measured)))
         best = descend(posed, dict(base.start) | dict(zip(base.free, means)))
-        own = Target(posed)
-        own.many, own.density = target.many, target.density  # compiled once: data is an argument
+        own = target.with_data_of(posed)
         found = laplace(own, best.y, 1500, seed=k)
         khat.append(found.checks["khat"])
         y, _ = nuts_draws(own, best.y, own.data, 4 * DRAWS, 1, 200, k, run)
@@ -79,6 +84,34 @@ def posterior_ranks(rng: np.random.Generator) -> tuple[dict, dict, float]:
             low, high = np.quantile(all_draws[method], [0.025, 0.975], axis=0)
             covered[method].append((low < truth) & (truth < high))
     return ranks, covered, float(np.max(khat))
+
+
+def choices(rng: np.random.Generator) -> tuple[list, np.ndarray, np.ndarray]:
+    """Ranks among the particles of tempered sampling; the probability of Demiray's law against a neo-Hookean one by
+    their evidences, and which it was: the law is drawn first, each with probability 1/2 (Schad et al. 2022).
+    """
+    priors = {"demiray": SLIGHT, "neo-hookean": {"energy.mu": SLIGHT["energy.mu"]}}
+    few = data(stress(1500.0), FEW)
+    bases = {
+        law: tj.fit(few, law, search=ONCE, unknowns=tj.Unknowns(priors=prior)).problem for law, prior in priors.items()
+    }
+    targets = {law: Target(base) for law, base in bases.items()}
+    ranks, probability, was = [], [], []
+    for k in range(DATA_SETS):
+        law = tuple(priors)[int(rng.integers(2))]
+        truth = truths(rng, priors[law])
+        measured = stress(*truth) + SIGMA * rng.normal(size=len(STRETCH))
+        found = {}
+        for name, base in bases.items():
+            posed = replace(base, predictor=eqx.tree_at(lambda p: p.sample, base.predictor, data(measured, FEW)))
+            found[name] = evidence(targets[name].with_data_of(posed), PARTICLES, 1, seed=k)
+        log_odds = found["demiray"].log_evidence - found["neo-hookean"].log_evidence
+        probability.append(1 / (1 + np.exp(-log_odds)))
+        was.append(law == "demiray")
+        draws = found[law].draws[0]
+        some = draws[rng.choice(len(draws), DRAWS, replace=False)]
+        ranks.append((law, (some < truth).sum(0)))
+    return ranks, np.array(probability), np.array(was)
 
 
 def counted(rng: np.random.Generator, every: int, std: float | None) -> dict[str, list]:
@@ -108,12 +141,19 @@ def main(folder: Path) -> str:
     """Ranks and coverages; result.json and a figure."""
     rng = np.random.default_rng(SEED)
     ranks, covered, khat = posterior_ranks(rng)
+    chosen, probability, was = choices(rng)
     record = {"data_sets": DATA_SETS, "draws": DRAWS, "khat_largest": khat, "ranks": {}, "coverage_95": {}}
-    for method, of in ranks.items():
-        counts = np.array([np.histogram(column, BINS, (-0.5, DRAWS + 0.5))[0] for column in np.array(of).T])
-        expected = DATA_SETS / BINS
-        p = chi2.sf(((counts - expected) ** 2 / expected).sum(1), BINS - 1)
-        record["ranks"][method] = {"counts": counts.tolist(), "uniform_p": dict(zip(PRIOR, p.tolist()))}
+    of_path = {method: dict(zip(PRIOR, np.array(of).T, strict=True)) for method, of in ranks.items()}
+    of_path["tempered"] = {path: np.array([r[i] for _, r in chosen if i < len(r)]) for i, path in enumerate(SLIGHT)}
+    for method, by in of_path.items():
+        counts = {path: np.histogram(r, BINS, (-0.5, DRAWS + 0.5))[0] for path, r in by.items()}
+        p = {path: float(chisquare(c).pvalue) for path, c in counts.items()}
+        record["ranks"][method] = {"counts": {path: c.tolist() for path, c in counts.items()}, "uniform_p": p}
+    record["evidence"] = {
+        "probability_of_the_law_with_more": probability.tolist(), "was_it": was.tolist(),
+        "expected": float(probability.sum()), "found": int(was.sum()),
+        "z": float((was - probability).sum() / np.sqrt((probability * (1 - probability)).sum())),
+    }  # fmt: skip
     tables = {"noise recorded, prior": covered}
     tables["noise recorded, 24 samples"] = counted(rng, 1, SIGMA)
     tables["noise not recorded, 8 samples"] = counted(rng, FEW, None)
@@ -127,26 +167,30 @@ def main(folder: Path) -> str:
     worst = min(p for m in record["ranks"].values() for p in m["uniform_p"].values())
     every = [c for of in record["coverage_95"].values() for c in of.values()]
     flat = [c for e in every for c in (e.values() if isinstance(e, dict) else [e])]
-    return f"{DATA_SETS} data sets: least p of uniform ranks {worst:.2f}; coverage {min(flat):.3f} to {max(flat):.3f}"
+    return (
+        f"{DATA_SETS} data sets: least p of uniform ranks {worst:.2f}; coverage {min(flat):.3f} to {max(flat):.3f}; "
+        f"choices by evidence {record['evidence']['z']:+.2f} standard deviations from what they say"
+    )
 
 
 def drawn(record) -> Figure:
-    """Histograms of ranks with the range in which 95 % of bins of a calibrated posterior lie; coverages below."""
+    """Histograms of ranks with the range in which 95 % of bins of a calibrated posterior lie; choices, coverages."""
     methods = list(record["ranks"])
-    figure = Figure(figsize=(9, 7.6), layout="constrained")
-    axes = figure.subplots(len(methods) + 1, len(PRIOR), squeeze=False)
-    low, high = binom.ppf([0.025, 0.975], DATA_SETS, 1 / BINS)
-    for row, method in zip(axes, methods, strict=False):
-        for ax, path, counts in zip(row, PRIOR, record["ranks"][method]["counts"], strict=True):
+    figure = Figure(figsize=(11, 8.4), layout="constrained")
+    axes = figure.subplots(3, len(methods), squeeze=False)
+    for column, method in enumerate(methods):
+        for ax, path in zip(axes[:2, column], PRIOR, strict=True):
+            counts = record["ranks"][method]["counts"][path]
+            low, high = binom.ppf([0.025, 0.975], sum(counts), 1 / BINS)
             ax.bar(np.arange(BINS), counts, color="#1f6fb2", label="data sets in the bin")
-            ax.axhspan(low, high, color="#d9730d", alpha=0.2, label="95 % of bins if uniform")
+            ax.axhspan(low, high, color="#d9730d", alpha=0.2, label="where 95 % of points lie if calibrated")
             p = record["ranks"][method]["uniform_p"][path]
             ax.set_title(f"{method}: {path}, p = {p:.2f}", loc="left", fontsize=9)
             ax.set_xlabel("rank of the truth among the draws, tenths", fontsize=8)
             ax.set_ylabel("data sets", fontsize=8)
             ax.set_ylim(0, 1.25 * max(max(counts), high))
-    low, high = binom.ppf([0.025, 0.975], DATA_SETS, 0.95) / DATA_SETS
-    for ax, path in zip(axes[-1], PRIOR, strict=True):
+    for ax, path in zip(axes[2], PRIOR, strict=False):
+        low, high = binom.ppf([0.025, 0.975], DATA_SETS, 0.95) / DATA_SETS
         rows = [(f"{m}\n{name}", of[path]) for name, by in record["coverage_95"].items() for m, of in by.items()
                 if isinstance(of, dict)]  # fmt: skip
         y = np.arange(len(rows))[::-1]
@@ -157,10 +201,25 @@ def drawn(record) -> Figure:
         ax.set_xlim(0.85, 1)
         ax.set_title(path, loc="left", fontsize=9)
         ax.set_xlabel("share of 95 % intervals that hold the truth", fontsize=8)
+    _choices(axes[2, -1], record["evidence"])
     figure.legend(
         *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False, fontsize=8
     )
     return figure
+
+
+def _choices(ax, of: dict) -> None:
+    """How often the law with more constants was the true one, against the probability it was given."""
+    p, was = np.array(of["probability_of_the_law_with_more"]), np.array(of["was_it"])
+    parts = np.array_split(np.argsort(p), 5)
+    for part in parts:
+        low, high = binom.ppf([0.025, 0.975], len(part), p[part].mean()) / len(part)
+        ax.plot([p[part].mean()] * 2, [low, high], color="#d9730d", alpha=0.4, linewidth=7, solid_capstyle="butt")
+        ax.plot(p[part].mean(), was[part].mean(), "o", color="#1f6fb2")
+    ax.plot([0, 1], [0, 1], color="#22313f", linewidth=0.8)
+    ax.set_title(f"evidence: found {of['found']}, expected {of['expected']:.1f} of {len(p)}", loc="left", fontsize=9)
+    ax.set_xlabel("probability given to Demiray's law, fifths of the data sets", fontsize=8)
+    ax.set_ylabel("share in which it was that law", fontsize=8)
 
 
 if __name__ == "__main__":

@@ -8,8 +8,8 @@ steps with the particles' own covariance. Source: Del Moral, Doucet and Jasra 20
 import math
 from dataclasses import dataclass
 
-import jax
 import numpy as np
+from jaxtyping import Float
 
 from tissuejax.errors import InputError
 from tissuejax.fitting.target import Target
@@ -20,11 +20,19 @@ STEPS = 12  # Metropolis steps on a rung
 
 @dataclass(frozen=True)
 class Evidence:
-    """ln Z with the constants of a normal likelihood, its spread over repeated runs, and the rungs of the ladder."""
+    """What tempered sampling tells.
+
+    Attributes:
+        log_evidence: ln Z with the constants of a normal likelihood.
+        std: its spread over repeated runs.
+        rungs: of the ladder, in the first run.
+        draws: (runs, particles, p) draws of the free parameters from the posterior, SI.
+    """
 
     log_evidence: float
     std: float
     rungs: int
+    draws: Float[np.ndarray, "r n p"]
 
 
 def evidence(target: Target, particles: int = 500, runs: int = 4, seed: int = 0) -> Evidence:
@@ -42,7 +50,9 @@ def evidence(target: Target, particles: int = 500, runs: int = 4, seed: int = 0)
         raise InputError(f"evidence needs proper priors: give {', '.join(bad)} a --prior, or both --bounds")
     sigma = target._sigma
     constant = -float(np.sum(np.log(sigma))) - 0.5 * len(sigma) * math.log(2 * math.pi)
-    likelihood = jax.jit(jax.vmap(lambda x: target.log_likelihood(x, target.data)))
+
+    def likelihood(x):
+        return target.likelihoods(x, target.data)
 
     def prior(x):
         """ln of the normal priors, unnormalised; they are part of log_likelihood and taken out there."""
@@ -57,10 +67,11 @@ def evidence(target: Target, particles: int = 500, runs: int = 4, seed: int = 0)
         _run(np.random.default_rng(seed + k), problem, lower, upper, likelihood, prior, particles) for k in range(runs)
     ]
     found = np.array([e[0] for e in ends]) + constant
-    return Evidence(float(found.mean()), float(found.std(ddof=1)) if runs > 1 else math.nan, ends[0][1])
+    spread = float(found.std(ddof=1)) if runs > 1 else math.nan
+    return Evidence(float(found.mean()), spread, ends[0][1], np.stack([e[2] for e in ends]))
 
 
-def _run(rng, problem, lower, upper, likelihood, prior, n: int) -> tuple[float, int]:
+def _run(rng, problem, lower, upper, likelihood, prior, n: int) -> tuple[float, int, np.ndarray]:
     x = _draw(rng, problem, lower, upper, n)
     ll = np.asarray(likelihood(x)) - prior(x)
     power, log_z, rungs = 0.0, 0.0, 0
@@ -84,7 +95,7 @@ def _run(rng, problem, lower, upper, likelihood, prior, n: int) -> tuple[float, 
             accept = inside & (np.log(rng.uniform(size=n)) < power * (ll_new - ll) + lp_new - lp)
             x, ll, lp = np.where(accept[:, None], new, x), np.where(accept, ll_new, ll), np.where(accept, lp_new, lp)
             scale *= math.exp(0.5 * (accept.mean() - 0.3))
-    return log_z, rungs
+    return log_z, rungs, x
 
 
 def _draw(rng, problem, lower, upper, n: int):

@@ -28,6 +28,8 @@ class Target:
         data: measured values of all residuals, flat; an argument of the density, so that one compiled function serves
             many data sets of one shape.
         tempering: c above.
+        density, many: (y, data) -> ln p of one and of many y, compiled.
+        likelihoods: (x, data) -> `log_likelihood` of many x, compiled.
     """
 
     def __init__(self, problem: Problem, tempering: float = 1.0):
@@ -47,6 +49,13 @@ class Target:
         self._sigma = np.concatenate([np.full(len(problem.seen[k]), problem.sigma(k)) for k in problem.channels])
         self.density = jax.jit(self._density)
         self.many = jax.jit(jax.vmap(self._density, in_axes=(0, None)))
+        self.likelihoods = jax.jit(jax.vmap(self.log_likelihood, in_axes=(0, None)))
+
+    def with_data_of(self, problem: Problem) -> "Target":
+        """The posterior of a problem that differs in its measured values only, without compiling again."""
+        other = Target(problem, self.tempering)
+        other.density, other.many, other.likelihoods = self.density, self.many, self.likelihoods
+        return other
 
     def start(self, x: Float[np.ndarray, " p"]) -> Float[np.ndarray, " p"]:
         """y of the parameters x."""
