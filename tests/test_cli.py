@@ -30,6 +30,15 @@ def test_help_teaches(name, capsys):
     assert "--json" in text
 
 
+def test_the_list_of_commands(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["--help"])
+    assert end.value.code == 0
+    text = capsys.readouterr().out
+    assert all(f"    {entry.name}" in text and entry.summary.split(", ")[0][:25] in text for entry in listed())
+    assert main([]) == 2
+
+
 def test_the_catalogue(capsys):
     code, record = answer(capsys, "energies")
     assert code == 0

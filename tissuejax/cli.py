@@ -79,13 +79,14 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
     top.add_argument("--version", action=Version, nargs=0, help="show the version and exit")
     below = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for entry in listed():
+        summary = entry.summary.replace("%", "%%")  # argparse fills in what follows a single one
         if only is not None and entry.name != only:
-            below.add_parser(entry.name, help=entry.summary)
+            below.add_parser(entry.name, help=summary)
             continue
         command = _command(entry)
         sub = below.add_parser(
             entry.name,
-            help=entry.summary,
+            help=summary,
             description=command.teaches.strip("\n"),
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )

@@ -65,7 +65,8 @@ machines, rheometers and indenters are recognised by their content.
             "--format", default="", metavar="NAME", help="the raw export's format, if it isn't recognised"
         )
         for size in SIZES:
-            parser.add_argument(f"--{size}", metavar="SIZE", help=f'{size} with its unit, e.g. "25mm"')
+            example = "78.5mm^2" if size == "area" else "25mm"
+            parser.add_argument(f"--{size}", metavar="SIZE", help=f'{size} with its unit, e.g. "{example}"')
         parser.add_argument("--force", action="store_true", help="overwrite what is there")
 
     def run(self, given: argparse.Namespace) -> Reply:
