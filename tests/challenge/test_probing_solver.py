@@ -1,15 +1,17 @@
 """The implicit solver of the probing cases: derivatives by differences, patch test, another solver's indentation."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from tests.conftest import outside
 from tissuejax.challenge.lobe import Grid, Lobe, graded, uniform
 from tissuejax.challenge.quasistatic import Band, Bed, Bench
 from tissuejax.challenge.solid import Solid, Tissue
 from tissuejax.challenge.touch import Membrane, Sphere
 
+CURVE = Path(__file__).parents[1] / "reference" / "indent_curve_NH_R40.csv"
 LOBE = Lobe(0.032, 0.028, 0.093, 0.0212, 0.48, 0.85, (0.01, -0.01), ((0.2, 0.1, 0.3, 5e-4),))
 EVERYTHING = Tissue(
     600,
@@ -125,7 +127,7 @@ def indented(n: int, layers: int, depths: np.ndarray) -> np.ndarray:
 
 def test_indentation_comes_near_another_solver():
     """Independent solver, converged: 0.05284 N at 2 mm. Elements here are as wide as a quarter of the probe."""
-    table = np.genfromtxt(outside("reference", "indent_curve_NH_R40.csv"), delimiter=",", skip_header=1)
+    table = np.genfromtxt(CURVE, delimiter=",", skip_header=1)
     F = indented(16, 6, np.array([0.3, 0.8, 1.4, 2.0]))
     assert F[-1] == pytest.approx(table[np.searchsorted(table[:, 0], 2.0), 1], rel=0.07)
     assert F[-1] > table[np.searchsorted(table[:, 0], 2.0), 1]  # displacement elements are too stiff, never too soft
@@ -133,7 +135,7 @@ def test_indentation_comes_near_another_solver():
 
 @pytest.mark.slow
 def test_indentation_converges_to_another_solver():
-    table = np.genfromtxt(outside("reference", "indent_curve_NH_R40.csv"), delimiter=",", skip_header=1)
+    table = np.genfromtxt(CURVE, delimiter=",", skip_header=1)
     depths = np.array([0.3, 0.8, 1.4, 2.0, 3.0, 4.0, 5.0])
     exact = np.interp(depths[3:], table[:, 0], table[:, 1])
     coarse, fine = (np.abs(indented(n, k, depths)[3:] / exact - 1) for n, k in ((16, 6), (24, 8)))

@@ -1,13 +1,13 @@
 """The source's materials against stresses and moduli from an independent program, in every Ogden form, to 6 digits."""
 
 import csv
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from tests.conftest import outside
 from tissuejax.energies import stress
 from tissuejax.energies.ogden import Ogden, convert
 from tissuejax.energies.paths import along
@@ -29,7 +29,7 @@ CASES = {
 
 
 def rows(name):
-    with open(outside("reference", name)) as file:
+    with open(Path(__file__).with_name(name)) as file:
         return list(csv.DictReader(file))
 
 
