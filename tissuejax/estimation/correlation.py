@@ -108,7 +108,8 @@ class _Surface:
         self.capped, self.tried = capped, WALKS if mismatch else 1
         time = np.asarray(series.time, float) - series.time[0]
         self.n, self.columns = len(time), series.values.reshape(len(time), -1).T
-        self.span, self.step = time[-1], float(np.median(np.diff(time)))
+        steps = np.diff(time)
+        self.span, self.step = time[-1], float(np.median(steps[steps > 0]))  # two samples may share a time
         line = np.stack([np.ones(self.n), time / self.span - 0.5], 1)
         self.columns = self.columns - (line @ np.linalg.lstsq(line, self.columns.T, rcond=None)[0]).T
         size = float(np.mean(self.columns**2)) or 1.0
@@ -116,7 +117,7 @@ class _Surface:
         self.least, self.most = math.log10(1e-6 / self.span**3), math.log10(1e3 / self.step**3)
         power = 2 ** math.ceil(math.log2(max(self.n, 256)))
         padded = 3 * power // 4 if self.n <= 3 * power // 4 else power  # few lengths, few programs
-        self.steps = np.pad(np.diff(time), (0, padded - self.n + 1))
+        self.steps = np.pad(steps, (0, padded - self.n + 1))
         self.seen = np.arange(padded) < self.n
         self.turns = np.isin(np.arange(padded), series.kinks)
         self.padded = [np.pad(c, (0, padded - self.n)) for c in self.columns]
@@ -304,8 +305,9 @@ def _filter_twice(steps, y, seen, turns, share, tau, walk, diffuse, span):
             [0, 0, walk * dt**3 / 3, walk * dt**2 / 2],
             [0, 0, walk * dt**2 / 2, walk * dt],
         ])  # fmt: skip
-        mean = jnp.einsum("ijt,jt->it", move, mean)
-        spread = jnp.einsum("ijt,jkt,lkt->ilt", move, spread, move) + fresh
+        mean = jnp.sum(move * mean, 1)
+        half = jnp.sum(move[:, :, None] * spread, 1)  # by hand: products of so small matrices are quicker as sums
+        spread = jnp.sum(half[:, None] * move, 2) + fresh
         return (mean, spread, logs, squares), None
 
     start = whole([
