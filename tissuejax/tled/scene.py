@@ -192,7 +192,8 @@ class Settings(eqx.Module):
 class Scene(eqx.Module):
     """The whole set-up; see the parts. `gravity` (m/s^2) acts on the mass of the tissue; None is none.
 
-    `faces` holds the two sides of a split body together; with them the run keeps its energy balance.
+    `faces` holds the two sides of a split body together; with them the run keeps its energy balance. `loads`
+    (`loads.Loads`) are nodal forces, tractions and pressures; neutral factor 0.
     """
 
     body: Body
@@ -204,6 +205,7 @@ class Scene(eqx.Module):
     markers: Markers | None = None
     gravity: Float[Array, " 3"] | None = None
     faces: Faces | None = None
+    loads: Any = None  # loads.Loads, one floor up
 
     def put(self, changes: Mapping[str, Any]) -> "Scene":
         """A copy with slots replaced, by dotted path: `scene.put({"tissue.stiffness": s, "probe.friction": 0.2})`.

@@ -153,7 +153,7 @@ def proceed(m: Machine, state: State) -> Outcome:
 
     if _too_much_to_store(scene):
         block = jax.checkpoint(block, prevent_cse=False)
-    drive = jax.tree.map(lambda x: x.reshape(blocks, length, clock.steps, 3), drives(scene, blocks * length))
+    drive = jax.tree.map(lambda x: x.reshape(blocks, length, clock.steps, *x.shape[1:]), drives(scene, blocks * length))
     if clock.needed is None:
         state, (series, checks) = jax.lax.scan(block, state, drive, length=blocks)
     else:
@@ -188,7 +188,7 @@ def _too_much_to_store(scene: Scene) -> bool:
 
 
 def drives(scene: Scene, frames: int) -> Drive:
-    """Outside motion at every step: probe position, its stride, and the support's motion at the step's end."""
+    """Outside motion at every step: probe position, its stride, the support's motion at the step's end, load factor."""
     clock, probe, support = scene.clock, scene.probe, scene.support
     count = frames * clock.steps
     real = clock.interval / clock.steps
@@ -203,7 +203,10 @@ def drives(scene: Scene, frames: int) -> Drive:
         motion = path[1:]
         if support.pattern is None:  # parts that move apart carry no body along
             pace = (path[1:] - path[:-1]) / clock.step
-    return Drive(centre, stride, motion, pace)
+    load = None
+    if scene.loads is not None:
+        load = series(scene.loads.time, scene.loads.factor, clock.start + real * jnp.arange(count))
+    return Drive(centre, stride, motion, pace, load)
 
 
 def series(time: Float[Array, " n"], values: Float[Array, "n ..."], at: Float[Array, " m"]) -> Float[Array, "m ..."]:

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from tissuejax.errors import NotConverged
-from tissuejax.tled import capsule, contact, internal, stable, support, verdict
+from tissuejax.tled import capsule, contact, internal, loads, stable, support, verdict
 from tissuejax.tled.scene import Scene
 from tissuejax.tled.simulate import COMPILER_OPTIONS, series
 
@@ -54,6 +54,7 @@ class Load(NamedTuple):
     held: Array
     target: Float[Array, "3 N"]
     diagonal: Float[Array, " N"]
+    factor: Float[Array, ""] | None = None
 
 
 def load(scene: Scene, time: float = 0.0) -> Load:
@@ -75,7 +76,10 @@ def load(scene: Scene, time: float = 0.0) -> Load:
         diagonal = diagonal.at[scene.body.facets].add(4 * scene.tissue.capsule)
     skin = None if scene.tissue.capsule is None else capsule.skin(scene.body)
     target = support.target(scene, hold, support.Slip(None, None), motion)
-    return Load(scene, mesh, skin, patch, centre, hold.held, target, diagonal)
+    factor = None
+    if scene.loads is not None:
+        factor = series(scene.loads.time, scene.loads.factor, jnp.asarray([time]))[0]
+    return Load(scene, mesh, skin, patch, centre, hold.held, target, diagonal, factor)
 
 
 def long_term(scene: Scene, mesh: internal.Mesh) -> internal.History:
@@ -95,6 +99,8 @@ def pull(at: Load, u: Float[Array, "3 N"]) -> tuple[Float[Array, "3 N"], Float[A
     if at.skin is not None:
         inner = inner + capsule.forces(at.skin, scene.tissue.capsule, u)
     outer = jnp.zeros_like(u) if scene.gravity is None else scene.gravity[:, None] * at.mesh.mass
+    if at.factor is not None:
+        outer = outer + loads.forces(scene.loads, scene.body.points, u, at.factor)
     if at.patch is not None:
         outer = outer + contact.forces(scene.probe, at.patch, u, at.centre, contact.untouched(scene.probe)).nodal
     return inner, outer
@@ -179,9 +185,9 @@ def equilibrium(
     """Static equilibrium of a scene under the loads at `time`. Pure JAX, differentiable both ways.
 
     Args:
-        scene: gravity, probe, support motion, capsule, stiffness field, added energies and long-term Prony stress
-            act; friction, adhesion and bedding do not. Start is `body.settled`, or rest.
-        time: real time at which probe and support are looked up, s.
+        scene: gravity, loads, probe, support motion, capsule, stiffness field, added energies and long-term Prony
+            stress act; friction, adhesion and bedding do not. Start is `body.settled`, or rest.
+        time: real time at which probe, support and loads are looked up, s.
         tolerance: on the greatest unbalanced force over the greatest force.
         most: iterations after which it is given up (the displacement is NaN then; `checked` says so).
         margin: fictitious mass over its estimate at rest; large strains stiffen and need more (4 at a stretch of 0.6):
@@ -190,11 +196,12 @@ def equilibrium(
     scene = scene.cast(scene.body.points.dtype)
     at = load(scene, time)
     first = jax.lax.stop_gradient(internal.settled(scene))
+    symmetric = scene.loads is None or scene.loads.pressure is None  # a pressure that ends at an edge has no potential
     w, (residual, count) = jax.lax.custom_root(
         partial(unbalanced, at),
         first,
         lambda _, start: relax(jax.lax.stop_gradient(at), start, tolerance, most, margin),
-        lambda apply, b: tangent_solve(jax.lax.stop_gradient(at), apply, b),
+        lambda apply, b: tangent_solve(jax.lax.stop_gradient(at), apply, b, symmetric),
         has_aux=True,
     )
     u = jnp.where(at.held, at.target, w)

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from tissuejax.tled import capsule, contact, faces, internal, stable, support
+from tissuejax.tled import capsule, contact, faces, internal, loads, stable, support
 from tissuejax.tled.glide import Glide, glide, spurred
 from tissuejax.tled.internal import barrier
 from tissuejax.tled.ledger import Spent
@@ -45,12 +45,13 @@ class State(NamedTuple):
 
 class Drive(NamedTuple):
     """Outside motion of one step: the probe at the step's start, how far it moves per step, the support at its end, and
-    the support's speed: damping brakes what moves against the support."""
+    the support's speed: damping brakes what moves against the support; the factor on loads at the step's start."""
 
     centre: Float[Array, " 3"] | None
     stride: Float[Array, " 3"] | None
     motion: Float[Array, " 3"] | None
     pace: Float[Array, " 3"] | None = None
+    load: Float[Array, ""] | None = None
 
 
 class Felt(NamedTuple):
@@ -127,6 +128,8 @@ def advance(m: Machine, state: State, drive: Drive) -> tuple[State, Felt]:
     u, v = state.u, state.v
     inner, history = tissue_forces(m, u + settings.stiffness_damping * v, state.history, real)
     outer = jnp.zeros_like(u) if m.weight is None else m.weight + 0.0
+    if scene.loads is not None:
+        outer = outer + loads.forces(scene.loads, scene.body.points, u, drive.load)
     zero = jnp.zeros(3, u.dtype)
     force = torque = zero
     work, grip, felt, opening = zero[0], state.grip, state.felt, state.opening
