@@ -37,6 +37,8 @@ def test_the_list_of_commands(capsys):
     text = capsys.readouterr().out
     assert all(f"    {entry.name}" in text and entry.summary.split(", ")[0][:25] in text for entry in listed())
     assert main([]) == 2
+    assert main(["sensitivity", "--nois", "1", "--nonsense", "2"]) == 2
+    assert "`tissuejax sensitivity --help`" in capsys.readouterr().err
 
 
 def test_the_catalogue(capsys):

@@ -77,8 +77,10 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
     """
     top = Parser(prog="tissuejax", description=TEACHES, formatter_class=argparse.RawDescriptionHelpFormatter)
     top.add_argument("--version", action=Version, nargs=0, help="show the version and exit")
+    entries = listed()
+    top.asked = only if only in {entry.name for entry in entries} else ""
     below = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for entry in listed():
+    for entry in entries:
         summary = entry.summary.replace("%", "%%")  # argparse fills in what follows a single one
         if only is not None and entry.name != only:
             below.add_parser(entry.name, help=summary)

@@ -8,6 +8,7 @@ tissuejax study fits/throughput          (CASES=1000 in the environment for a fi
 """
 
 import os
+import resource
 import shutil
 import time
 from pathlib import Path
@@ -55,9 +56,9 @@ def timed(folder: Path, engine: str, workers: int, n: int) -> dict:
     side, mu = cohort(folder, n)
     began = time.perf_counter()
     store = begin(folder / "campaign", [side], Settings("fit", "neo-hookean", multistart=1))
-    planning, client, others, at = time.perf_counter() - began, time.process_time(), load(), time.time()
+    planning, client, others, at, theirs = time.perf_counter() - began, time.process_time(), load(), time.time(), cpu()
     told = go_on(folder / "campaign", engine, workers, progress=for_terminal())
-    client = time.process_time() - client
+    client, theirs = time.process_time() - client, cpu() - theirs
     kept = sorted(store.path(task.key).stat().st_mtime - at for task in Store(store.folder).planned()[0])
     late = kept[len(kept) // 10 :]  # all workers are at it by then
     rows = {r["sample"]: r for r in table(folder / "campaign")}
@@ -67,8 +68,15 @@ def timed(folder: Path, engine: str, workers: int, n: int) -> dict:
         "within_95": float(np.mean(np.abs(z) < 1.96)), "planning_seconds": planning, "seconds": told["seconds"],
         "first_after_seconds": kept[0], "per_second": told["per_second"],
         "per_second_started": (len(late) - 1) / max(late[-1] - late[0], 1e-9),
-        "client_ms_a_case": 1e3 * client / n, "load_before": others,
+        "client_ms_a_case": 1e3 * client / n, "workers_cpu_ms_a_case": 1e3 * theirs / n, "load_before": others,
+        "load_after": load(),
     }  # fmt: skip
+
+
+def cpu() -> float:
+    """CPU seconds of the processes begun here that have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def load() -> float:

@@ -50,7 +50,7 @@ tests and cuts begin anew.
     def arguments(self, parser: argparse.ArgumentParser) -> None:
         """FILE, base model, hold-out and --out."""
         parser.add_argument("file", metavar="FILE", help="recording file or side file; FILE#NAME for one of many")
-        parser.add_argument("--energy", required=True, metavar="NAME", help="base model: a strain energy by name")
+        parser.add_argument("--energy", "-e", required=True, metavar="NAME", help="base model: a strain energy by name")
         parser.add_argument("--ogden-form", metavar="FORM", help="for ogden-N: which form the constants mean")
         parser.add_argument(
             "--holdout", action="append", metavar="NAME", help="recording to predict (repeat); default: the last one"

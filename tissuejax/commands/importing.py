@@ -121,10 +121,11 @@ def _said(guess: Guess, side: Path, given: argparse.Namespace) -> Reply:
     for name in names(side):
         sample = read(side, name)
         for key, recording in sample.recordings.items():
-            spans = {k: v for k, v in recording.inputs.items() if "time" not in k}
-            spans |= {k: c.values for k, c in recording.channels.items()}
-            said = ", ".join(f"{k} {v.min():.4g} to {v.max():.4g}" for k, v in spans.items())
-            lines.append(f"  {name}, {key}: {recording.experiment}, {len(next(iter(spans.values())))} samples, {said}")
+            spans = {k: (v, "") for k, v in recording.inputs.items() if "time" not in k}
+            spans |= {k: (c.values, f" {c.unit}") for k, c in recording.channels.items()}
+            said = ", ".join(f"{k} {v.min():.4g} to {v.max():.4g}{unit}" for k, (v, unit) in spans.items())
+            n = len(next(iter(spans.values()))[0])
+            lines.append(f"  {name}, {key}: {recording.experiment}, {n} samples, {said}")
         found = remarks(sample)
         record["remarks"] += found
         lines += [f"  note: {remark}" for remark in found]

@@ -13,7 +13,13 @@ _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser that refuses by raising InputError: one sentence, no block of usage."""
+    """An argument parser that refuses by raising InputError: one sentence, no block of usage.
+
+    Attributes:
+        asked: the command that was called, where this parser is the one of all commands.
+    """
+
+    asked = ""
 
     def error(self, message: str) -> NoReturn:
         """The sentence for what argparse found.
@@ -21,7 +27,8 @@ class Parser(argparse.ArgumentParser):
         Raises:
             InputError: always.
         """
-        raise InputError(f"{self._plain(message)}; `{self.prog} --help` explains it")
+        called = f"{self.prog} {self.asked}".strip()
+        raise InputError(f"{self._plain(message)}; `{called} --help` explains it")
 
     def _plain(self, message: str) -> str:
         found = re.fullmatch(r"argument (.+?): invalid (\w+) value: (.*)", message, re.S)
