@@ -7,14 +7,11 @@ import time
 from collections.abc import Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields, replace
-from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 from tissuejax.cache.key import key
 from tissuejax.errors import InputError
 from tissuejax.recordings.files import read, read_all
-from tissuejax.recordings.recording import Sample
 
 KINDS = ("fit", "diagnose")
 BY_PATH = {"fix", "start", "bounds", "priors"}
@@ -96,11 +93,6 @@ class TooLong(Exception):
     """A case took longer than its limit."""
 
 
-@lru_cache(maxsize=2)
-def _samples(file: str, changed: float) -> dict[str, Sample]:
-    return read_all(file)
-
-
 def answer(task: Task) -> dict[str, Any]:
     """The row of a task: "done" with the record, or "failed" with the reason; never raises for what a case may do.
 
@@ -124,9 +116,7 @@ def _solved(task: Task) -> dict[str, Any]:
     import jax
 
     jax.config.update("jax_enable_x64", True)
-    path = task.file.partition("#")[0]
-    sample = _samples(task.file, os.path.getmtime(path) if Path(path).exists() else 0.0).get(task.sample)
-    sample = read(task.file, task.sample) if sample is None else sample
+    sample = read(task.file, task.sample)  # of a large table its own rows only; the table itself is kept in memory
     s = task.settings
     held = tuple(name for name in s.holdout if name in sample.recordings)
     if s.kind == "diagnose":

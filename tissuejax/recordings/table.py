@@ -162,6 +162,8 @@ def _grouped(path: Path, changed: int, tables: tuple) -> dict[str, dict[str, Gro
             )
         keys = np.stack([_labels(part.sample, columns)[rows], _labels(part.recording, columns)[rows]])
         pairs, first, which = np.unique(keys.astype(str), axis=1, return_index=True, return_inverse=True)
+        ends = np.cumsum(np.bincount(which.ravel()))[:-1]
+        own = np.split(rows[np.argsort(which.ravel(), kind="stable")], ends)  # of each pair, in file order
         for k in np.argsort(first):
             sample, recording = (str(x).replace("/", "-").strip() for x in pairs[:, k])
             mine = found.setdefault(sample, {})
@@ -170,7 +172,7 @@ def _grouped(path: Path, changed: int, tables: tuple) -> dict[str, dict[str, Gro
                     f"{path}: two parts make recording {recording!r} of sample {sample!r}; "
                     'give each part its own, e.g. recording = "tension" and recording = "shear"'
                 )
-            mine[recording] = Group(part, columns, rows[which.ravel() == k])
+            mine[recording] = Group(part, columns, own[k])
     return found
 
 
