@@ -57,6 +57,18 @@ def test_an_effect_by_its_own_name_or_by_that_of_another():
     ]
 
 
+def test_a_number_smaller_than_its_error_is_not_said():
+    def row(value, std, unit):
+        return {"value": value, "std": std, "unit": unit}
+
+    two = {"g1": row(0.0056, 0.028, "1"), "tau1": row(0.89, 6.8, "s"), "g2": row(0.49, 0.02, "1")}
+    two["tau2"] = row(8.0, 0.2, "s")
+    listed = [{"name": "viscoelasticity", "parameters": {f"effects.viscoelasticity.{k}": v for k, v in two.items()}}]
+    assert clauses(listed) == ["49 % of the stress relaxes with 8.0 s"]
+    two["g2"]["std"] = float("nan")
+    assert clauses(listed) == ["viscoelasticity"]
+
+
 RICH = {"viscoelasticity": {"terms": 5}, "energy-form": {"terms": ("C20", "C30", "C01", "C02", "exponential", "ogden")}}
 
 

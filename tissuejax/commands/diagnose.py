@@ -100,7 +100,10 @@ def _only(sample: Sample, only: list[str], holdout: list[str] | None) -> Sample:
 def diagnosed(found: Diagnosis, written: dict[str, Path]) -> Reply:
     """The verdict as text and as the record of `--json`."""
     lines = [headline(found), "", f"Verdict: {found.verdict.kind}. {judged.lead(found)}", ""]
-    lines += [f"  {r['path']:<40}{r['value']:>24} {r['unit']:<6}{r['note']}" for r in sentences.parameters(found)]
+    lines += [
+        f"  {r['path']:<40}{r['value']:>24} {r['unit']:<6}{r['note'] or r['interval']}".rstrip()
+        for r in sentences.parameters(found)
+    ]
     lines += ["", *judged.sure(found), ""]
     lines += [f"page     {written['page']}", f"numbers  {written['result']}"]
     record = found.as_dict() | {

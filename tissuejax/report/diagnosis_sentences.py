@@ -1,10 +1,12 @@
 """A diagnosis in sentences: what its effects mean, what it can't tell, what to measure next; tables of parameters."""
 
 import inspect
+import math
 
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.effects.catalogue import effects
-from tissuejax.report.scales import with_std
+from tissuejax.report.scales import display, with_std
+from tissuejax.report.sentences import identified
 
 
 def names_of(d: Diagnosis) -> list[str]:
@@ -58,27 +60,53 @@ def limits(d: Diagnosis) -> list[str]:
 
 
 def parameters(d: Diagnosis) -> list[dict]:
-    """Rows of the table of effects."""
+    """Rows of the table of effects, in units that people read."""
     rows = []
     for effect in d.effects(d.verdict.chosen):
         for path, p in effect["parameters"].items():
-            note = "on its bound" if p["at_bound"] else ""
-            value = with_std(p["value"], p["std"])
-            rows.append({"effect": effect["name"], "path": path, "value": value, "unit": p["unit"], "note": note})
+            factor, unit = display(p["unit"], abs(p["value"]))
+            rows.append(
+                {
+                    "effect": effect["name"],
+                    "path": path,
+                    "value": _value(d, path, p["value"], p["std"], factor),
+                    "interval": _interval(d, path, p, factor),
+                    "unit": "" if unit == "1" else unit,
+                    "note": "on its bound" if p["at_bound"] else "",
+                }
+            )
     return rows
 
 
 def base(d: Diagnosis) -> list[dict]:
-    """Rows of the table of base parameters."""
-    return [
-        {
-            "path": path,
-            "before": with_std(p["before"], p["before_std"]),
-            "after": with_std(p["after"], p["after_std"]),
-            "unit": p["unit"],
-        }
-        for path, p in d.base().items()
-    ]
+    """Rows of the table of base parameters, before and after in one unit."""
+    rows = []
+    for path, p in d.base().items():
+        factor, unit = display(p["unit"], abs(p["after"]))
+        rows.append(
+            {
+                "path": path,
+                "before": _value(d, path, p["before"], p["before_std"], factor),
+                "after": _value(d, path, p["after"], p["after_std"], factor),
+                "unit": "" if unit == "1" else unit,
+            }
+        )
+    return rows
+
+
+def _value(d: Diagnosis, path: str, value: float, std: float | None, factor: float) -> str:
+    """Value and standard error, or words where the error says that nothing is known."""
+    if std is None:
+        return with_std(value / factor, None)
+    known = identified(value, std, d.answered.bench.free[path].scale)
+    return with_std(value / factor, std / factor if known else math.inf)
+
+
+def _interval(d: Diagnosis, path: str, p: dict, factor: float) -> str:
+    std, ends = p["std"], p["interval"]
+    if std is None or ends is None or not identified(p["value"], std, d.answered.bench.free[path].scale):
+        return ""
+    return " to ".join(f"{end / factor:.4g}" for end in ends)
 
 
 def places(d: Diagnosis, most: int = 10) -> list[dict]:

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from tissuejax.diagnosis.periodogram import periodogram
 from tissuejax.diagnosis.result import Diagnosis
-from tissuejax.report.plot import FAINT, INK, MODEL, Plot, grid
+from tissuejax.report.plot import FAINT, INK, MODEL, Plot, grid, legend_below
 
 
 class DiagnosisSpectrum(Plot):
@@ -41,10 +41,11 @@ class DiagnosisSpectrum(Plot):
 
     def draw(self, data: dict) -> Figure:
         """Both spectra on logarithmic scales."""
-        figure, (ax,) = grid(1, width=7.5, height=2.9)
-        ax.loglog(data["frequency"], np.maximum(data["before"], 1e-2), color=FAINT, linewidth=1)
-        ax.loglog(data["frequency"], np.maximum(data["after"], 1e-2), color=MODEL, linewidth=0.9)
-        ax.axhline(1, color=INK, linewidth=0.6, linestyle=":")
+        figure, (ax,) = grid(1, height=2.9)
+        ax.loglog(data["frequency"], np.maximum(data["before"], 1e-2), color=FAINT, linewidth=1, label="base model")
+        ax.loglog(data["frequency"], np.maximum(data["after"], 1e-2), color=MODEL, linewidth=0.9, label="with effects")
+        ax.axhline(1, color=INK, linewidth=0.6, linestyle=":", label="white noise")
         ax.set_xlabel("frequency (Hz)")
         ax.set_ylabel("power / that of white noise")
+        legend_below(figure, [ax])
         return figure

@@ -21,10 +21,15 @@ READ = {  # units that a reader would not use, and what is read instead
 
 @dataclass(frozen=True)
 class Found:
-    """A fitted parameter, one value or one for each recording, SI."""
+    """A fitted parameter, one value or one for each recording, SI.
+
+    Attributes:
+        drowned: its errors are larger than its values: what it leads is no statement.
+    """
 
     values: tuple[float, ...]
     unit: str
+    drowned: bool = False
 
     def __format__(self, how: str) -> str:
         if how == "exp":
@@ -49,25 +54,42 @@ def said(name: str, found: Mapping[str, Found]) -> str:
         if not all(n in found for n in names):
             continue
         leading = [n for n in names if found[n].unit == found[names[0]].unit]
-        if not names or any(any(found[n].values) for n in leading):
-            spoken.append(clause.format(**{n: found[n] for n in names}))
+        if not names or any(any(found[n].values) and not found[n].drowned for n in leading):
+            spoken.append(
+                (clause if spoken else _opening(clause, kind.words[0])).format(**{n: found[n] for n in names})
+            )
     return ", ".join(spoken)
 
 
+def _opening(clause: str, first: str) -> str:
+    """`clause`, or the first one with its numbers: "{g2} with {tau2}" goes on from a first term that is not said."""
+    number = re.search(r"\{\w*?(\d)[:}]", clause)
+    whole = re.sub(r"(\{\w*?)1(?=[:}])", rf"\g<1>{number[1]}", first) if number else clause
+    fields = [{m[1] for m in _FIELD.finditer(text)} for text in (clause, whole)]
+    return whole if fields[0] == fields[1] else clause
+
+
 def clauses(listed: Sequence[dict]) -> list[str]:
-    """One clause for every effect of a diagnosis (`Diagnosis.effects`); its name where it has no words."""
+    """One clause for every effect of a diagnosis (`Diagnosis.effects`); its name where it has no words, or none that
+    its errors bear: a number smaller than its own error is no statement.
+    """
     out = []
     for entry in listed:
-        by_effect: dict[str, dict[str, list[tuple[float, str]]]] = {}
+        by_effect: dict[str, dict[str, list[dict]]] = {}
         for path, p in entry["parameters"].items():
             effect, parameter = path.removeprefix("effects.").split(".")[:2]
-            by_effect.setdefault(effect, {}).setdefault(parameter, []).append((p["value"], p["unit"]))
+            by_effect.setdefault(effect, {}).setdefault(parameter, []).append(p)
         parts = [
-            said(effect, {n: Found(tuple(v for v, _ in of), of[0][1]) for n, of in parameters.items()})
-            for effect, parameters in by_effect.items()
+            said(effect, {n: _found(of) for n, of in parameters.items()}) for effect, parameters in by_effect.items()
         ]
         out.append(", ".join(part for part in parts if part) or entry["name"].replace("-", " "))
     return list(dict.fromkeys(out))
+
+
+def _found(of: Sequence[dict]) -> Found:
+    """A parameter from its records, one or one for each recording; one that was held has no error."""
+    lost = all(p.get("std") is not None and not p["std"] <= abs(p["value"]) for p in of)
+    return Found(tuple(p["value"] for p in of), of[0]["unit"], lost)
 
 
 def _between(values: Sequence[float]) -> str:

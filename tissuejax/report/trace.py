@@ -4,6 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from tissuejax.fitting.result import Fit
 from tissuejax.report.plot import FAINT, MODEL, Plot, grid
@@ -39,6 +40,7 @@ class Trace(Plot):
         steps.set_ylabel("chi-square")
         order = np.sort(data["ends"])
         ends.semilogy(np.arange(1, len(order) + 1), order, "o", color=MODEL, markerfacecolor=FAINT)
+        ends.xaxis.set_major_locator(MaxNLocator(integer=True))
         ends.set_xlabel("start, sorted")
         ends.set_ylabel("chi-square at its end")
         return figure
