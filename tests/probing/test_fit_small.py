@@ -40,7 +40,7 @@ def posed(geometry=BODY, settings=QUICK):
     return problem(p, unknowns=Unknowns(start=START, fix=KNOWN))
 
 
-@pytest.mark.parametrize("geometry", [BODY, tets()], ids=["hexes", "tets"])
+@pytest.mark.parametrize("geometry", [BODY, pytest.param(tets(), marks=pytest.mark.slow)], ids=["hexes", "tets"])
 def test_the_stiffness_is_found_again(geometry):
     settings = QUICK if geometry is BODY else replace(QUICK, step=4e-4)
     found = fit_probed(posed(geometry, settings), numerical=False, finish=False).fit

@@ -36,11 +36,11 @@ def duct(n: int) -> float:
 
 
 def test_second_order_in_the_mesh():
-    """4, 8 and 16 elements a side: the error falls fourfold each time."""
-    a, b, c = (duct(n) for n in (4, 8, 16))
+    """4, 8 and 12 elements a side: the error falls with the square of their number."""
+    a, b, c = (duct(n) for n in (4, 8, 12))
     assert a / b == pytest.approx(4.0, rel=0.1)
-    assert b / c == pytest.approx(4.0, rel=0.05)
-    assert abs(c) < 5e-3
+    assert b / c == pytest.approx(1.5**2, rel=0.05)
+    assert abs(c) < 1e-2
 
 
 BALL, LAYER = 0.02, 0.02
@@ -77,12 +77,13 @@ def pressed(depth: float, counts, penalty: float = 1.0) -> float:
     return 4 * float(found.force[2])
 
 
-@pytest.mark.parametrize("depth", [5e-4, 1e-3])
+@pytest.mark.parametrize("depth", [pytest.param(5e-4, marks=pytest.mark.slow), 1e-3])
 def test_a_small_depth_is_hertz_with_the_bonded_layer(depth):
     """A ball of 20 mm, 0.5 and 1 mm deep (contact radii 3.2 and 4.5 mm); facets of 0.63 mm."""
     assert pressed(depth, (16, 12)) == pytest.approx(bonded(depth), rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_penalty_hardly_matters():
     """Half and twice the automatic penalty move the force by less than the mesh does (2 % at this depth)."""
     half, one, two = (pressed(1e-3, (12, 8), factor) for factor in (0.5, 1.0, 2.0))
