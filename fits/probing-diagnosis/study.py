@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import tissuejax as tj
+from tissuejax.cache.source import content
 from tissuejax.diagnosis.diagnose import diagnose
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.errors import InputError
@@ -28,13 +29,14 @@ NAMES = {
 
 
 def main(folder: Path) -> str:
-    """Diagnose each case, compare with its key, write result.json and the figures; a stopped study goes on."""
+    """Diagnose each case, compare with its key, write result.json and the figures; goes on where this code stopped."""
     practice = Path(os.environ.get("TISSUEJAX_SHARED", folder.resolve().parents[2] / "shared")) / "practice"
     if not (practice / "p01.h5").exists():
         raise InputError(f"{practice / 'p01.h5'} is not here: set TISSUEJAX_SHARED to the folder that holds practice/")
     keys = json.loads((practice / "keys-probing.json").read_text())
     done = folder / "result.json"
-    records = json.loads(done.read_text())["cases"] if done.exists() else {}
+    before = json.loads(done.read_text()) if done.exists() else {}
+    records = before["cases"] if before.get("code") == content() else {}
     for name in CASES:
         if name in records:
             continue
@@ -43,7 +45,7 @@ def main(folder: Path) -> str:
         found = diagnose(tj.read(practice / f"{name}.h5"), "reduced-polynomial-2", out=out, progress=for_terminal())
         records[name] = compared(found, keys[name]) | {"seconds": time.perf_counter() - begun}
         write_figures(found, folder / "figures" / name)
-        write_json(done, {"cases": records})
+        write_json(done, {"code": content(), "cases": records})
     right = sum(r["right"] for r in records.values())
     return f"{right} of {len(records)} right: " + "; ".join(f"{n} {r['told']}" for n, r in records.items())
 
