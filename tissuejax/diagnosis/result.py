@@ -69,7 +69,7 @@ class Diagnosis:
         """`result.json`."""
         a, bench = self.answered, self.answered.bench
         j = a.judgement
-        named = j.kind in (Kind.FOUND, Kind.IN_PART, Kind.AMBIGUOUS)
+        named = j.kind.speaks
         effects = self.effects(a.chosen)
         stated = [e for e in effects if j.kind is Kind.AMBIGUOUS or e["name"] in j.names]
         return {

@@ -16,7 +16,7 @@ def brief(found: Diagnosis) -> dict:
         `rmse_over_peak` (before and after, fitted and held out), `sets` (the best few), `seconds`.
     """
     v, bench, candidates = found.verdict, found.search.bench, found.search.bench.candidates
-    named = v.kind in ("found", "ambiguous")
+    named = v.kind.speaks
     roles = {"fitted": bench.mask(bench.fitted), "held_out": bench.mask(bench.held_out)}
 
     def rmse(prediction: np.ndarray) -> dict[str, float]:

@@ -5,6 +5,7 @@ from typing import ClassVar
 import numpy as np
 from matplotlib.figure import Figure
 
+from tissuejax.diagnosis.judgement.judge import Kind
 from tissuejax.diagnosis.specimens import Specimens
 from tissuejax.report.plot import FAINT, HELD, INK, MODEL, Plot, grid
 
@@ -49,13 +50,13 @@ class DiagnosisSpecimens(Plot):
     def caption(self, data: dict) -> str:
         """What was found in how many."""
         n = len(data["names"])
-        named = np.array([v in ("found", "ambiguous") for v in data["verdicts"]])
+        named = np.array([Kind(v).speaks for v in data["verdicts"]])
         counts = [int(np.sum(np.isfinite(data["rank"][named, j]))) for j in range(len(data["effects"]))]
         found = [f"{e} in {k}" for e, k in zip(data["effects"], counts, strict=True) if k]
         return (
             f"{n} specimens, each diagnosed for itself: {', '.join(found) or 'no effect named'} of {n}. Left: effects "
-            "found, the first one darkest; ? ambiguous, x unexplained (open: the best attempt). Right: RMSE over peak, "
-            "base model (grey), with the effects (blue fitted, orange held out)."
+            "found, the first one darkest; + in part, ? ambiguous, x unexplained (open: the best attempt). Right: RMSE "
+            "over peak, base model (grey), with the effects (blue fitted, orange held out)."
         )
 
     def draw(self, data: dict) -> Figure:
@@ -71,7 +72,7 @@ class DiagnosisSpecimens(Plot):
                     shade = max(1 - 0.3 * order, 0.25)
                     left.plot(j, y[i], "s", color=MODEL, markerfacecolor=inside, alpha=shade, markersize=7)
         for i, kind in enumerate(data["verdicts"]):
-            mark = {"ambiguous": "?", "unexplained": "x", "nothing-missing": "–"}.get(kind, "")
+            mark = {"found-in-part": "+", "ambiguous": "?", "unexplained": "x", "nothing-missing": "–"}.get(kind, "")
             left.text(len(data["effects"]) - 0.4, y[i], mark, color=INK, fontsize=8, va="center")
         left.set_xticks(range(len(data["effects"])), data["effects"], rotation=35, ha="right")
         left.set_xlim(-0.7, max(len(data["effects"]), 1) - 0.1)

@@ -35,6 +35,11 @@ class Kind(enum.StrEnum):
     AMBIGUOUS = "ambiguous"
     UNEXPLAINED = "unexplained"
 
+    @property
+    def speaks(self) -> bool:
+        """Whether effects stand in the answer: named, or offered as alternatives."""
+        return self in (Kind.FOUND, Kind.IN_PART, Kind.AMBIGUOUS)
+
 
 @dataclass(frozen=True)
 class Judgement:
