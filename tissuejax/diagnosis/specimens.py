@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tissuejax.diagnosis.judgement.judge import Kind
 from tissuejax.diagnosis.result import Diagnosis
 
 
@@ -16,7 +17,8 @@ def brief(found: Diagnosis) -> dict:
         `rmse_over_peak` (before and after, fitted and held out), `sets` (the best few), `seconds`.
     """
     v, bench, candidates = found.verdict, found.search.bench, found.search.bench.candidates
-    named = v.kind.speaks
+    named, said = v.kind.speaks, found.answered.judgement.names
+    names = dict.fromkeys(candidates[k].name for k in v.chosen.keys)
     roles = {"fitted": bench.mask(bench.fitted), "held_out": bench.mask(bench.held_out)}
 
     def rmse(prediction: np.ndarray) -> dict[str, float]:
@@ -26,7 +28,7 @@ def brief(found: Diagnosis) -> dict:
     return {
         "verdict": v.kind,
         "confidence": v.confidence,
-        "effects": list(dict.fromkeys(candidates[k].name for k in v.chosen.keys)) if named else [],
+        "effects": [n for n in names if v.kind is Kind.AMBIGUOUS or n in said] if named else [],
         "best_attempt": [] if named else list(v.chosen.keys),
         "parameters": {
             path: [p["value"], p["std"], p["unit"]]
