@@ -16,17 +16,18 @@ from tissuejax.recordings.recording import Channel
 
 class ClockLag(Effect):
     """In a material test, stress stamped t is that of the stretch at t - lag; in a probing, a marker frame stamped t
-    shows the tissue at t - lag. Neutral: 0.
+    shows the tissue at t - lag; in a cut, force stamped t is that of the blade at t - lag. Neutral: 0.
 
-    Revealed by residuals in proportion to the rate of what was done, none in holds: in a probing by markers alone.
-    Blind: recordings at one rate without holds (it then looks like hysteresis), or at rest; probings without markers.
+    Revealed by residuals in proportion to the rate of what was done, none in holds: in a probing by markers alone, in a
+    cut where the blade enters, turns, and leaves. Blind: recordings at one rate without holds (it then looks like
+    hysteresis), or at rest; probings without markers; a cut recorded in its steady middle.
     Source: Lister 2012, 2.2.1 (force at 62.5 Hz and cameras at 15 Hz on separate clocks).
     """
 
     name: ClassVar[str] = "clock-lag"
-    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing", "cutting"})
     reveals: ClassVar[str] = "residuals proportional to the rate of what was done, none in holds"
-    blind: ClassVar[str] = "ramps at one rate without holds; holds alone; probings without markers"
+    blind: ClassVar[str] = "ramps at one rate without holds; holds alone; probings without markers; the steady middle of a cut"
     words: ClassVar[tuple[str, ...]] = ("the clocks are {lag} apart",)
     needs: ClassVar[str] = "rates"
     misjudged: ClassVar[Mapping[str, float]] = {"lag": 0.05}  # of one controller: its filters, a few samples
@@ -55,7 +56,9 @@ class ClockLag(Effect):
     def channels(
         self, p: Mapping[str, Array], test: ProbingTest, channels: Mapping[str, Channel]
     ) -> Mapping[str, Channel]:
-        if "markers" not in channels:
-            return channels
-        seen = channels["markers"]
-        return {**channels, "markers": Channel(seen.time + p["lag"], seen.values, seen.unit, seen.noise_std)}
+        late = {
+            name: Channel(seen.time + p["lag"], seen.values, seen.unit, seen.noise_std)
+            for name, seen in channels.items()
+            if name in ("markers", "cutting_force")
+        }
+        return {**channels, **late}
