@@ -27,7 +27,9 @@ class ClockLag(Effect):
     name: ClassVar[str] = "clock-lag"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing", "cutting"})
     reveals: ClassVar[str] = "residuals proportional to the rate of what was done, none in holds"
-    blind: ClassVar[str] = "ramps at one rate without holds; holds alone; probings without markers; the steady middle of a cut"
+    blind: ClassVar[str] = (
+        "ramps at one rate without holds; holds alone; probings without markers; the steady middle of a cut"
+    )
     words: ClassVar[tuple[str, ...]] = ("the clocks are {lag} apart",)
     needs: ClassVar[str] = "rates"
     misjudged: ClassVar[Mapping[str, float]] = {"lag": 0.05}  # of one controller: its filters, a few samples
