@@ -213,6 +213,14 @@ def test_engines_give_the_same_bits(tmp_path, engine):
     )
 
 
+def _lives(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("whom", ["worker", "client"])
 def test_killing_loses_no_more_than_what_was_under_way(tmp_path, whom):
@@ -233,8 +241,12 @@ def test_killing_loses_no_more_than_what_was_under_way(tmp_path, whom):
         assert client.wait(300) == 0
         assert status(tmp_path / "c")["done"] == 40
     else:
-        os.killpg(client.pid, signal.SIGKILL)
+        worker = json.loads(next(results.rglob("*.json")).read_text())["worker"]
+        os.kill(client.pid, signal.SIGKILL)  # the client alone: its worker has to notice
         client.wait()
+        while _lives(worker):
+            assert time.monotonic() - begun < 300, "the worker outlived its client"
+            time.sleep(0.05)
         there = status(tmp_path / "c")["done"]
         assert len(list((tmp_path / "c" / "running").iterdir())) <= 1
         told = go_on(tmp_path / "c")

@@ -1,6 +1,8 @@
 """Processes of this machine. One that is killed takes its case with it; the pool is made anew and goes on."""
 
 import multiprocessing
+import os
+import threading
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from typing import ClassVar
@@ -29,7 +31,7 @@ class Processes(Engine):
     def _pool(self, store: Store, left: list[Task], workers: int, report: Report) -> bool:
         """Work until `left` is empty or a worker dies; what was not finished is put back."""
         context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        with ProcessPoolExecutor(workers, mp_context=context, initializer=leave_with_parent) as pool:
             out = {}
             while left or out:
                 try:
@@ -45,6 +47,13 @@ class Processes(Engine):
                     left.extend(out.values())
                     return True
         return False
+
+
+def leave_with_parent() -> None:
+    """End this process when its parent is gone: a killed client would leave it waiting for a next case for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
 
 
 RETRIES = 2  # times a case is begun again within one run after its worker died
