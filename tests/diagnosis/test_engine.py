@@ -30,6 +30,7 @@ def test_one_effect_is_found_with_its_parameters():
     for path, true in {"relax.g": 0.2, "relax.tau": 0.6, "a": 10.0, "b": 20.0}.items():
         assert found.chosen.values[path] == pytest.approx(true, abs=4 * found.chosen.std[path])
     assert found.explained[1] > 0.98
+    assert found.rest()["unit"] == "N"
 
 
 def test_two_effects_are_found_together():

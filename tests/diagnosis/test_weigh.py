@@ -93,6 +93,28 @@ def test_a_set_that_can_not_be_predicted_is_void_and_not_ranked(bench):
     assert e.best == frozenset()
 
 
+def test_sets_that_may_still_come_to_the_top_are_those_near_it(bench):
+    """Evidence made up: 8 nats below the best is as far as another form may bring a set up."""
+    on, base = scales(bench)
+    e = Exploration(bench, Criteria(), Effort(), on)
+    e.weighed = {frozenset(): base}
+    for name, above in (("relax", 30.0), ("offset", 26.0), ("form", 5.0)):
+        said = replace(base.evidence, keys=(name,), names=(name,), log_evidence=base.evidence.log_evidence + above)
+        e.weighed[frozenset({name})] = replace(base, evidence=said)
+    relax, offset, form = (frozenset({k}) for k in ("relax", "offset", "form"))
+    assert e.best == relax
+    assert e.ranked(1) == [relax, offset, form]
+    assert e.near(1) == [relax, offset]
+
+
+def test_the_share_explained_is_none_for_the_base_and_nearly_all_for_the_truth(bench):
+    on, base = scales(bench)
+    again = weigh(on, (), base.refit.values, Criteria())
+    assert again.evidence.explained == pytest.approx(0.0, abs=0.05)
+    found = weigh(on, ("relax",), base.refit.values | {"relax.g": 0.2}, Criteria())
+    assert 0.95 < found.evidence.explained <= 1.0
+
+
 @pytest.mark.parametrize("iterations", [1, 12])
 def test_the_density_is_that_of_the_parameters_reached(bench, iterations):
     """Not of those that a straight line leads to from there: the discrepancy moves with what they predict."""

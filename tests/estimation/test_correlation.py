@@ -152,10 +152,11 @@ def test_nulls_of_correlated_noise_are_judged_noise_in_95_of_100(third):
     assert bad <= 5
 
 
-def test_the_likelihood_is_that_of_the_dense_covariance(rng):
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_likelihood_is_that_of_the_dense_covariance(order, rng):
     """Two trials of share, time and walk: their difference against dense matrices with the same prior."""
     time = np.sort(rng.uniform(0, 20, 80))
-    y = rng.normal(size=80)
+    y = rng.normal(size=80) + 5 * np.sin(time)
     surface = correlation._Surface(Series(time, y[:, None]))
     seen = time - time[0]
     kept = surface.padded[0][:80]
@@ -163,7 +164,7 @@ def test_the_likelihood_is_that_of_the_dense_covariance(rng):
 
     def dense(share, tau, walk):
         lesser, greater = np.minimum.outer(seen, seen), np.maximum.outer(seen, seen)
-        k = Noise.shaped(share, tau).covariance(seen)
+        k = Noise.shaped(share, tau, order=order).covariance(seen)
         k = k + walk * (lesser**2 * greater / 2 - lesser**3 / 6)  # integrated Wiener process, Wahba 1978
         k = k + diffuse * (1 + np.outer(seen, seen) / span**2)
         n = len(seen)
@@ -173,8 +174,9 @@ def test_the_likelihood_is_that_of_the_dense_covariance(rng):
 
     shares, taus = np.linspace(0.1, 0.9, correlation.SHARES), np.geomspace(0.1, 5, correlation.TAUS)
     walks = surface.walks(surface.least, surface.most, correlation.WALKS)
-    found, walk, _ = surface(shares, taus, walks, free=True)
+    found, walk, _ = surface(shares, taus, walks, free=True, order=order)
     for i, j in ((0, 0), (3, 5), (5, 6)):
+        assert walk[i, j] > 0
         theirs = dense(shares[i], taus[j], walk[i, j])
         assert found[i, j] == pytest.approx(theirs, abs=1e-5)
 

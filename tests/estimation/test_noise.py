@@ -83,8 +83,8 @@ def test_refusals():
         Noise(0.0, 0.0)
     with pytest.raises(InputError, match="time must be positive"):
         Noise(1.0, 1.0, 0.0)
-    with pytest.raises(InputError, match="runs backwards after sample 1"):
-        Noise(0.1, 1.0, 1.0).whiten(np.zeros(3), np.array([0.0, 1.0, 0.5]))
+    with pytest.raises(InputError, match="runs backwards after sample 2"):
+        Noise(0.1, 1.0, 1.0).whiten(np.zeros(4), np.array([0.0, 0.0, 1.0, 0.5]))
     with pytest.raises(InputError, match="3 samples at 2 times"):
         Noise().whiten(np.zeros(3), np.zeros(2))
 

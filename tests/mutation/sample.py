@@ -2,8 +2,9 @@
 
     python tests/mutation/sample.py ROOM [N] [SEED]         ROOM: a file of this folder; N: 24, SEED: 0 by default
 
-A room's file names modules and, for each, the tests that say whether its numbers are right, the quickest first. Mutants
-are those of cosmic-ray, of the last commit, in a copy of it that is removed afterwards. Left out are those that can't
+A room's file names modules and, for each, the tests that say whether its numbers are right, the quickest first; what
+survives those meets the room's `wider` tests, if it has any. Mutants are
+those of cosmic-ray, of the last commit, in a copy of it that is removed afterwards. Left out are those that can't
 change a number or that any import would notice: annotations, the text of errors, bit operations on numbers, orders of
 what is compared by identity, decorators.
 
@@ -81,25 +82,36 @@ def interval(k: int, n: int) -> tuple[float, float]:
     return centre - half, centre + half
 
 
-def score(tests: dict[str, str], n: int, seed: int, folder: Path) -> str:
+class Runner:
+    """Runs tests on mutants, with a patience that goes by what the unchanged code takes."""
+
+    def __init__(self):
+        self.took: dict[str, float] = {}
+
+    def __call__(self, item, tests: str):
+        """The result of some tests on a mutant."""
+        command = f"{sys.executable} -m pytest -x -q -p no:cacheprovider {tests}"
+        if command not in self.took:
+            begun = time.perf_counter()
+            subprocess.run(shlex.split(command), check=True, stdout=subprocess.DEVNULL)
+            self.took[command] = time.perf_counter() - begun
+            print(f"unchanged{self.took[command]:6.1f} s  {tests}", flush=True)
+        return mutate_and_test(item.mutations, command, max(120.0, PATIENCE * self.took[command]))
+
+
+def score(tests: dict[str, str], wider: str, n: int, seed: int, folder: Path) -> str:
     """Draw, run, count; in the working directory, which is a copy."""
     items = mutants([Path(m) for m in tests], folder)
     drawn = random.Random(seed).sample(items, min(n, len(items)))
-    took: dict[str, float] = {}
-    survived, timeouts = [], 0
+    run, survived, timeouts = Runner(), [], 0
     for item in drawn:
         (m,) = item.mutations
-        command = f"{sys.executable} -m pytest -x -q -p no:cacheprovider {tests[str(m.module_path)]}"
-        if command not in took:
-            begun = time.perf_counter()
-            subprocess.run(shlex.split(command), check=True, stdout=subprocess.DEVNULL)
-            took[command] = time.perf_counter() - begun
-            print(f"unchanged{took[command]:6.1f} s  {tests[str(m.module_path)]}", flush=True)
-        begun = time.perf_counter()
-        result = mutate_and_test(item.mutations, command, max(120.0, PATIENCE * took[command]))
+        result = run(item, tests[str(m.module_path)])
+        if wider and result.test_outcome == TestOutcome.SURVIVED:
+            result = run(item, wider)
         outcome = "timeout" if result.output == "timeout" else str(result.test_outcome.value)
         where = f"{m.module_path}:{m.start_pos[0]} {m.operator_name.removeprefix('core/')}"
-        print(f"{outcome:<9}{time.perf_counter() - begun:6.1f} s  {where}", flush=True)
+        print(f"{outcome:<9} {where}", flush=True)
         timeouts += outcome == "timeout"
         if result.test_outcome == TestOutcome.SURVIVED:
             survived.append(result.diff)
@@ -112,7 +124,8 @@ def score(tests: dict[str, str], n: int, seed: int, folder: Path) -> str:
 
 def main(room: str, n: int = 24, seed: int = 0) -> str:
     """Score a room in a copy of the last commit."""
-    tests = tomllib.loads((HERE / f"{room}.toml").read_text())["modules"]
+    said = tomllib.loads((HERE / f"{room}.toml").read_text())
+    tests, wider = said["modules"], said.get("wider", "")
     with tempfile.TemporaryDirectory() as name:
         folder, copy = Path(name), Path(name) / "copy"
         subprocess.run(["git", "-C", HERE, "worktree", "add", "-q", "--detach", copy, "HEAD"], check=True)
@@ -122,13 +135,13 @@ def main(room: str, n: int = 24, seed: int = 0) -> str:
                            "XLA_FLAGS": "--xla_backend_optimization_level=0 --xla_llvm_disable_expensive_passes=true",
                            "JAX_COMPILATION_CACHE_DIR": str(folder / "programs"),
                            "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0"}  # fmt: skip
-            said = score(tests, n, seed, folder)
+            told = score(tests, wider, n, seed, folder)
             commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True).stdout
         finally:
             os.chdir(HERE)
             subprocess.run(["git", "-C", HERE, "worktree", "remove", "--force", copy], check=True)
     spent = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return f"{room} at {commit.strip()}: {said}, {spent.ru_utime + spent.ru_stime:.0f} s of CPU time"
+    return f"{room} at {commit.strip()}: {told}, {spent.ru_utime + spent.ru_stime:.0f} s of CPU time"
 
 
 if __name__ == "__main__":
