@@ -3,10 +3,12 @@
 import json
 import subprocess
 import sys
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
+from tissuejax.cache import source
 from tissuejax.cli import commands, listed, main
 
 ROOT = Path(__file__).parents[1]
@@ -199,3 +201,14 @@ def test_inspecting_brings_no_plots_along():
     )
     told = subprocess.run([sys.executable, "-c", said], capture_output=True, text=True, check=True)
     assert told.stdout.split() == ["False", "False"]
+
+
+def test_a_study_notes_when_and_by_which_code_it_ran(tmp_path, capsys):
+    (tmp_path / "study.py").write_text("def main(folder):\n    return '1 of 1 right'\n")
+    (tmp_path / "run.json").write_text('{"diagnosis.py": {"answer": "kept"}}')
+    assert main(["study", str(tmp_path)]) == 0
+    noted = json.loads((tmp_path / "run.json").read_text())
+    assert noted["diagnosis.py"] == {"answer": "kept"}
+    assert noted["study.py"]["answer"] == "1 of 1 right"
+    assert noted["study.py"]["source"] == source.LOADED
+    assert abs(datetime.now(UTC) - datetime.fromisoformat(noted["study.py"]["date"])).total_seconds() < 600

@@ -63,9 +63,19 @@ def measure(scenes: dict, rounds: int = 5) -> dict:
     return best
 
 
+def model() -> str:
+    """The processor's name, as far as the system tells, and whether it has AVX-512."""
+    try:
+        told = Path("/proc/cpuinfo").read_text()
+        name = told.split("model name")[1].split(":")[1].split("\n")[0].strip()
+        return f"{name}, {'AVX-512' if 'avx512f' in told else 'no AVX-512'}"
+    except (OSError, IndexError):
+        return platform.processor() or platform.machine()
+
+
 def machine() -> dict:
     """Where the figures come from."""
-    return {"processor": platform.processor() or platform.machine(), "jax": jax.__version__, "load": os.getloadavg()[0]}
+    return {"processor": model(), "jax": jax.__version__, "load": os.getloadavg()[0]}
 
 
 def write(name: str, figures: dict) -> None:

@@ -1,9 +1,12 @@
 """Our step over the hand-written one of `yardstick.c`, in one run and in turns. Run as a script, where a C compiler is.
 
-    OMP_NUM_THREADS=1 XLA_FLAGS=--xla_cpu_multi_thread_eigen=false [TISSUEJAX_NATIVE=on] python ...
+    OMP_NUM_THREADS=1 XLA_FLAGS=--xla_cpu_multi_thread_eigen=false [TISSUEJAX_NATIVE=on] python ... [HEXES A SIDE ...]
 
-Writes `results/yardstick.json`: bandwidth, multiply-adds, ns of CPU time an element and step, and the ratio.
+Writes `results/yardstick.json`, or with the element loop in C `results/yardstick_c.json`: bandwidth, multiply-adds, ns
+of CPU time an element and step, and the ratio.
 """
+
+import sys
 
 import jax.numpy as jnp
 import numpy as np
@@ -31,14 +34,17 @@ def beside(n: int, precision: str, rounds: int = 5) -> dict:
             "ratio": round(ours / theirs, 2), "displacements apart": apart}  # fmt: skip
 
 
-def main() -> None:
+def main(sides: list[int]) -> None:
     machine = measure()
     if machine is None:
         print("no C compiler here: nothing to hold our step against")
         return
-    figures = {f"{n**3} hexes, {p}": beside(n, p) for n in (10, 20, 30) for p in ("float32", "float64")}
-    write("yardstick", {"element loop in C": native.wanted(), "processor can": machine} | figures)
+    figures = {f"{n**3} hexes, {p}": beside(n, p) for n in sides for p in ("float32", "float64")}
+    write(
+        "yardstick_c" if native.wanted() else "yardstick",
+        {"element loop in C": native.wanted(), "processor can": machine} | figures,
+    )
 
 
 if __name__ == "__main__":
-    main()
+    main([int(n) for n in sys.argv[1:]] or [10, 20, 30])

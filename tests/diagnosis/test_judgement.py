@@ -133,6 +133,19 @@ def dense(part: Part) -> np.ndarray:
     return out
 
 
+def test_slow_wander_is_a_share_of_the_peak_and_fades_in_time():
+    """Every amplitude of one is the peak (100); the slow part of one series is correlated and that of two is not."""
+    _, parts, _ = made()
+    time = np.linspace(0, 20, 50)
+    slow = [p.within[0] for p in parts if p.name.startswith("slow")]
+    assert slow
+    for block in slow:
+        fade = -np.log(block[0, 1:] / 100.0**2) / time[1:]
+        np.testing.assert_allclose(np.diag(block), 100.0**2)
+        np.testing.assert_allclose(fade, fade[0], rtol=1e-9)
+        assert fade[0] > 0
+
+
 def test_the_marginal_is_the_normal_density_with_parameters_integrated_out():
     """With proper priors: y - f ~ N(J (mean - theta), D + sum v B + J weak^-1 J'), by scipy's density."""
     linear, parts, blocked = made()

@@ -1,15 +1,20 @@
 """`tissuejax study`: re-run the studies on real recordings in `fits/`, each by its own scripts."""
 
 import argparse
+import datetime
+import json
 import os
 import runpy
 import shutil
+import subprocess
 import time
 from pathlib import Path
 from typing import ClassVar
 
+from tissuejax.cache import source
 from tissuejax.commands.command import Command, Reply
 from tissuejax.errors import InputError
+from tissuejax.storage import write_json
 
 SCRIPTS = ("study.py", "diagnosis.py")
 
@@ -22,7 +27,8 @@ class Study(Command):
     summary: ClassVar[str] = "re-run a study on real recordings (a folder under fits/)"
     teaches: ClassVar[str] = """
 Re-runs a study: its question and answer are in FOLDER/README.md, its numbers in FOLDER/result.json (those of the
-diagnosis of the same recordings in FOLDER/diagnosis.json), its figures beside them. The recordings themselves are
+diagnosis of the same recordings in FOLDER/diagnosis.json), its figures beside them, and in FOLDER/run.json when, by
+which commit and code and in how long each script ran last. The recordings themselves are
 not part of the project; the environment variable TISSUEJAX_SHARED names the folder that holds them (recordings/...), by
 default ../shared beside the checkout.
 
@@ -60,11 +66,26 @@ does so in the copy too.
             answer = runpy.run_path(str(script))["main"](script.parent)
             name = str(script.parent if script.name == SCRIPTS[0] else script)
             done[name] = {"seconds": time.perf_counter() - begun, "answer": answer}
+            _note(script, done[name])
         lines = [f"{name}: {d['seconds']:.0f} s, {d['answer']}" for name, d in done.items()]
         lines += (
             [] if given.out else ["", "numbers and figures in these folders were overwritten; --out runs in a copy"]
         )
         return Reply({"studies": done}, "\n".join(lines))
+
+
+def _note(script: Path, done: dict) -> None:
+    """Write into `run.json` beside the numbers when and by which code a script ran."""
+    path = script.parent / "run.json"
+    kept = json.loads(path.read_text()) if path.exists() else {}
+    asked = ["git", "-C", str(source.ROOT), "describe", "--always", "--dirty", "--exclude", "*"]
+    try:
+        commit = subprocess.run(asked, capture_output=True, text=True).stdout.strip()
+    except OSError:  # no git here
+        commit = ""
+    now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+    said = {"date": now, "commit": commit or None, "source": source.LOADED, "seconds": round(done["seconds"], 1)}
+    write_json(path, kept | {script.name: said | {"answer": done["answer"]}})
 
 
 def _copied(script: Path, out: Path) -> Path:
