@@ -5,9 +5,11 @@ four regions of the brain. Every specimen is fitted by itself; the hierarchical 
 separate ones. Then specimens are held out, five parts in turn, with their group known or with their whole group held
 out, and it is counted how often the 95 % interval holds their estimate and the stress that was measured on them.
 
-tissuejax study fits/population
+tissuejax study fits/population        (COHORTS=Ecoflex,brain in the environment: only these; the others' results stay)
 """
 
+import json
+import os
 import re
 from contextlib import suppress
 from pathlib import Path
@@ -125,10 +127,14 @@ def _inside(draws: np.ndarray, value: np.ndarray) -> np.ndarray:
 
 def main(folder: Path) -> str:
     """Fit, shrink, hold out; result.json, and a page for each cohort under figures/."""
-    record, fits_folder = {}, folder.resolve().parent
+    kept, fits_folder = folder / "result.json", folder.resolve().parent
+    wanted = set(filter(None, os.environ.get("COHORTS", "").split(",")))
+    record = json.loads(kept.read_text()) if wanted and kept.is_file() else {}
     if not (fits_folder / "beef").is_dir():
         fits_folder = Path(__file__).resolve().parents[1]
     for name, told in cohorts(fits_folder).items():
+        if wanted and name not in wanted:
+            continue
         fits = separate(told)
         rows = {k: f.record() for k, f in fits.items()}
         groups = {k: (re.search(told["group"], k) or ["", "other"])[1] for k in fits} if "group" in told else None
@@ -148,7 +154,7 @@ def main(folder: Path) -> str:
         }  # fmt: skip
         if len(of.labels) > 3:
             record[name]["held_out"]["groups"] = covered(of, fits, True, runner)
-        write_json(folder / "result.json", record)
+        write_json(kept, record)
     told = {n: r["held_out"]["specimens"]["hierarchical"]["estimate"] for n, r in record.items()}
     return "held-out specimens inside 95 %: " + ", ".join(f"{n} {share:.0%}" for n, share in told.items())
 

@@ -83,7 +83,9 @@ no parabola; where it does not close, the data do not bound the parameter on tha
         lines = [f"{'parameter':<36}{'estimate':>12}  {'95 % by profile':<28}{'by standard error'}"]
         for path, t in rows.items():
             ends, normal = (" to ".join(_end(e) for e in t[key]) for key in ("interval", "normal"))
-            lines.append(f"{path:<36}{t['value']:>12.5g}  {ends:<28}{normal} {t['unit']}")
+            lines.append(
+                f"{path:<36}{t['value']:>12.5g}  {ends:<28}{normal}{'' if t['unit'] == '1' else ' ' + t['unit']}"
+            )
         lines += [f"  ! {w}" for w in found.warnings] + ["", *(str(p) for p in files.values())]
         record = {"profiles": rows, "warnings": found.warnings, "files": {n: str(p) for n, p in files.items()}}
         return Reply(record, "\n".join(lines), 0 if found.converged else 3)
