@@ -2,7 +2,8 @@
 
 Workers share two things: the machine's cores, and the one client that hands cases out. The first is measured by the
 rate once all have started and by the CPU time of a case, the second by the client's own CPU time a case (under Dask the
-scheduler's with it); so on free cores the rate is the smaller of (workers / CPU time of a case) and (1 / client's time a case).
+scheduler's with it); so on free cores the rate is the smaller of (workers / CPU time of a case) and (1 / client's time
+a case).
 
 tissuejax study fits/throughput          (CASES=1000 in the environment for a first look)
 """
