@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 
 from tissuejax.diagnosis.bench import Bench, Candidate, Free, Segment
 from tissuejax.diagnosis.judgement import answer as judged
-from tissuejax.diagnosis.judgement.blocks import blocks, series
+from tissuejax.diagnosis.judgement.blocks import State, blocks, series, strain
 from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.errors import InputError
 from tissuejax.estimation.discrepancy import discrepancy
@@ -205,7 +205,8 @@ def answer(data: dict[str, np.ndarray]) -> tuple[dict, Sites, tuple[np.ndarray, 
     whole = copy.copy(bench)
     whole.fitted, whole.held_out = (*bench.fitted, *bench.held_out), ()
     cut = blocks(whole)
-    of = discrepancy(series(whole, cut, dict.fromkeys(whole.fitted, "press")), cut.spread(whole.sigma))
+    states = [State("press", strain(s)[:, None]) for s in whole.segments]
+    of = discrepancy(series(whole, cut, states), cut.spread(whole.sigma))
     v = judged.answer(bench, whole, cut, of, EFFORT)
     mask = {n: bench.mask((n,)) for n in ("fitted sites", "held-out sites")}
 
@@ -213,7 +214,7 @@ def answer(data: dict[str, np.ndarray]) -> tuple[dict, Sites, tuple[np.ndarray, 
         return {n: float(np.sqrt(np.mean((bench.y - r.prediction)[m] ** 2))) for n, m in mask.items()}
 
     alone = {
-        s.label or " + ".join(s.keys) or "one tissue": {
+        " + ".join(s.keys) or "one tissue": {
             "log_evidence": s.log_evidence,
             "chi2_with_all_sites": s.chi2 / s.n,
             "parameters": s.k,
