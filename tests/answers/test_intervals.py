@@ -74,6 +74,14 @@ def test_the_posterior_of_a_linear_law_is_normal(found, method):
 
 
 @BAYES
+def test_few_draws_are_said_to_be_few(found):
+    from tissuejax.fitting.posterior import laplace, target_of
+
+    drawn = laplace(target_of(found), np.array([found.values[p] for p in found.free]), 60)
+    assert any("draws count" in w for w in drawn.warnings)
+
+
+@BAYES
 def test_a_bound_cuts_the_posterior():
     from tissuejax.fitting.posterior import laplace, target_of
 

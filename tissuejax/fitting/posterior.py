@@ -18,6 +18,7 @@ from tissuejax.fitting.target import Target
 
 RELIABLE = 0.7  # of k-hat
 EVEN = 0.95  # effective share of the draws: above, the weights are all alike and a fit of their tail says nothing
+ENOUGH = 100  # effective draws, below which the ends of a 95 % interval rest on two or three of them
 CONVERGED = 1.01  # of R-hat
 MISSING = "needs the extra `bayes`: pip install 'tissuejax[bayes]' (blackjax, arviz)"
 
@@ -96,6 +97,8 @@ def laplace(target: Target, x: Float[np.ndarray, " p"], draws: int = 2000, seed:
     said = ()
     if not khat < RELIABLE and share < EVEN:
         said = (f"Pareto k-hat is {khat:.2f}, above {RELIABLE}: the posterior is far from normal; use NUTS",)
+    if share * draws < ENOUGH:
+        said += (f"only {share * draws:.0f} of {draws} draws count: intervals are coarse; use NUTS, or more --draws",)
     return Posterior(
         "laplace", target.problem.free, target.parameters(y[kept])[None], {"khat": khat, "ess_share": share}, said
     )
