@@ -143,25 +143,6 @@ def test_standard_errors_are_the_scatter_of_the_estimates(case):
     assert 0.88 <= inside <= 1.0
 
 
-def test_intervals_hold_behind_a_low_pass_of_second_order():
-    """Butterworth's, its corner at a fifth of half the sampling rate: not the shape that is assumed."""
-    low = scipy.signal.butter(2, 0.2, output="sos")
-    size = np.std(scipy.signal.sosfilt(low, np.random.default_rng(1).normal(size=100_000)))
-
-    def make(rng):
-        sample = toy_sample(rng, TRUE, n=200, noise=0.0)
-        for r in sample.recordings.values():
-            channel = r.channels["nominal_stress"]
-            filtered = scipy.signal.sosfilt(low, rng.normal(size=1200))[-200:] / size
-            r.channels["nominal_stress"] = Channel(channel.time, channel.values + filtered, "Pa", 1.0)
-        return sample
-
-    scatter, std, inside = drawn(make, TWO, 30)
-    assert np.all(std > 0.8 * scatter)
-    assert np.all(std < 2 * scatter)
-    assert inside > 0.9
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_intervals_cover_95_percent_over_400_draws(case):

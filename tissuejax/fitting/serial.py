@@ -53,7 +53,7 @@ def serial(problem: Problem, residuals: Float[np.ndarray, " n"]) -> Serial:
         if not any(_noticed(residuals[rows]) for rows, _ in columns):
             continue
         series = [Series(time, residuals[rows][:, None]) for rows, time in columns]
-        found = estimate(series, recorded=False, orders=(1, 2), mismatch=False)
+        found = estimate(series, recorded=False)
         parts += [
             (rows, time, noise)
             for (rows, time), noise in zip(columns, found.noises, strict=True)
