@@ -11,9 +11,10 @@ the model of Kennedy and O'Hagan (2001), with the parts that rests of material t
 | own law | squared exponential in strain (0.5) times the stress, of each recording's own (specimens differ in form) |
 | hysteresis | squared exponential in strain (0.4) times a loading state, in three shapes, shared by a mode |
 | slow | exponential in time (0.05, 0.25 and 1.5 of the recording), of each recording's own |
+| waning gain | the stress times exponential in time (0.5 of the recording): stiffness that comes and goes, or is lost |
 | white | what scatters from sample to sample beyond the stated noise |
 
-Amplitudes a_k are shares of the stress that the model predicts (law, gain), of its peak in the recording (hysteresis),
+Amplitudes a_k are shares of the stress that the model predicts (law, gain, waning gain), of its peak in the recording (hysteresis),
 or of the measured peak there (slow, white). Of what the model predicts: about the stress of another model a gain could
 bring that model's answer in, and about the measured peak a part that all specimens share would carry how they differ.
 
@@ -30,6 +31,7 @@ LAW = {"law": 0.5, "fine law": 0.12}  # correlation lengths, of the range of str
 ALIKE = 0.4  # correlation length of hysteresis, of the range of strain
 STATES = {"step": 0.01, "narrow": 0.06, "wide": 0.3}  # path over which the loading state turns, of the range
 SLOW = {"quick": 0.05, "slow": 0.25, "lasting": 1.5}  # correlation times, of a recording's duration
+WANING = 0.5  # correlation time of a gain, of a recording's duration
 LEFT_OUT = 1e-5  # of the largest eigenvalue: what smooth parts are cut off at
 BAND = 0.005  # of the range: a drive that trembles by less has not turned round
 
@@ -114,6 +116,7 @@ class Discrepancy:
         own: factors of a law of each recording's own, about a stress of one; its series of a mode share it.
         turning: factors of hysteresis about a peak of one, by name.
         fixed: the parts that don't depend on the prediction.
+        fading: of a gain that changes in time, by series, how alike two samples are.
     """
 
     laws: tuple[tuple[str, Float[np.ndarray, "N r"]], ...]
@@ -121,6 +124,7 @@ class Discrepancy:
     own: Float[np.ndarray, "N q"]
     turning: tuple[tuple[str, Float[np.ndarray, "N r"]], ...]
     fixed: tuple[Part, ...]
+    fading: tuple[Float[np.ndarray, "n n"], ...]
 
     def about(self, prediction: Float[np.ndarray, " N"]) -> tuple[Part, ...]:
         """The parts beside this prediction, Pa; always in the same order."""
@@ -129,7 +133,12 @@ class Discrepancy:
         several = (Part("gain", "gain", stress * self.belongs), Part("own law", "gain", stress * self.own))
         peak = self.belongs @ np.max(np.abs(stress) * self.belongs, axis=0)
         turning = (Part(name, "hysteresis", peak[:, None] * factor) for name, factor in self.turning)
-        return (*laws, *several, *turning, *self.fixed)
+        edges = np.cumsum([0, *(len(alike) for alike in self.fading)])
+        waning = tuple(
+            alike * np.outer(prediction[a:b], prediction[a:b])
+            for alike, a, b in zip(self.fading, edges, edges[1:], strict=False)
+        )
+        return (*laws, *several, *turning, *self.fixed, Part("waning gain", "slow", within=waning))
 
 
 def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"]) -> Discrepancy:
@@ -157,12 +166,11 @@ def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"]) -> Dis
     modes = [s.mode for s in series]
     near, out = shared(ALIKE, modes), []
     turning = tuple((f"hysteresis, {shape}", near * states[:, i, None]) for i, shape in enumerate(STATES))
+    shares = [s.time / (float(np.ptp(s.time)) or 1.0) for s in series]
+    apart = [np.abs(elapsed[:, None] - elapsed) for elapsed in shares]  # of the recording's duration
     for name, time in SLOW.items():
-        blocks = []
-        for s in series:
-            elapsed = s.time / (float(np.ptp(s.time)) or 1.0)
-            blocks.append(s.peak**2 * np.exp(-np.abs(elapsed[:, None] - elapsed) / time))
-        out.append(Part(name, "slow", within=tuple(blocks)))
+        alike = (s.peak**2 * np.exp(-d / time) for s, d in zip(series, apart, strict=True))
+        out.append(Part(name, "slow", within=tuple(alike)))
     scatter = []
     for i, s in enumerate(series):
         own = sigma[of == i]
@@ -170,4 +178,11 @@ def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"]) -> Dis
     out.append(Part("white", "white", within=tuple(scatter)))
     laws = tuple((name, shared(length, modes)) for name, length in LAW.items())
     own = shared(LAW["law"], [(s.recording, s.mode) for s in series])
-    return Discrepancy(laws, (belongs[:, None] == np.arange(len(recordings))).astype(float), own, turning, tuple(out))
+    return Discrepancy(
+        laws,
+        (belongs[:, None] == np.arange(len(recordings))).astype(float),
+        own,
+        turning,
+        tuple(out),
+        tuple(np.exp(-d / WANING) for d in apart),
+    )

@@ -39,6 +39,8 @@ class Criteria:
             Ground: load cells are verified to 1 % (class 1 of ISO 7500-1); half of that.
         unseen: share of a sensor's noise, of single samples, up to which a rest of a simulation is negligible too.
             Ground: markers are seen to a tenth of what most of them move; half of that shows in no picture.
+        misstated: factor by which a stated noise level may be wrong: what scatters from sample to sample up to there
+            is noise, and beyond it a rest. Ground: a level read off a rest, or off another channel, is seldom worse.
         named: probability from which a name is given. Ground: likelier present than not (the median probability model
             of Barbieri and Berger 2004).
         covered: share of the probability of named sets that the alternatives offered add up to.
@@ -60,6 +62,7 @@ class Criteria:
     shape: float = float(np.log(5.0))
     negligible: float = 0.005
     unseen: float = 0.5
+    misstated: float = 2.0
     named: float = 0.5
     covered: float = 0.9
 

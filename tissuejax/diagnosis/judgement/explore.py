@@ -15,6 +15,7 @@ import numpy as np
 
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.judgement.blocks import Blocks
+from tissuejax.diagnosis.judgement.coloured import coloured
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.judge import log_prior
@@ -349,6 +350,9 @@ def explore(
             f"the base model can't be fitted to {', '.join(bench.fitted)}: its prediction is not finite there from any "
             "parameters tried; name another --energy, or leave out the samples of largest strain"
         )
+    if (noise := coloured(scales.blocked, bench, cut, base.refit.prediction)) is not None:
+        scales.blocked = noise
+        base = weigh(scales, (), base.refit.values, criteria)
     scales.values, scales.reference = base.refit.values, scales.cut.mean(base.refit.prediction)
     scales.bench = e.bench = (base.bench or bench).anchored(base.refit.values).rooted(base.refit.values)
     scales.bench.free = bench.free  # without the priors of a set

@@ -85,17 +85,25 @@ class Marginal:
 
 @dataclass(frozen=True)
 class Blocked:
-    """Which rows belong to which block of D, the noise on its diagonal, and by block what all its rows err by alike."""
+    """Which rows belong to which block of D, and the noise there.
+
+    Attributes:
+        rows: of each block.
+        sigma: standard deviation of the noise.
+        shared: by block, what all its rows err by alike.
+        noise: by block, covariance of noise that is correlated in time; independent entries without it.
+    """
 
     rows: tuple[slice, ...]
     sigma: Float[np.ndarray, " N"]
     shared: Float[np.ndarray, " B"] | None = None
+    noise: tuple[Float[np.ndarray, "n n"], ...] | None = None
 
     def within(self, parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> list[Float[np.ndarray, "n n"]]:
         """The blocks of D."""
         out = []
         for i, rows in enumerate(self.rows):
-            block = np.diag(self.sigma[rows] ** 2)
+            block = np.diag(self.sigma[rows] ** 2) if self.noise is None else self.noise[i].copy()
             if self.shared is not None:
                 block += self.shared[i] ** 2
             for part, x in zip(parts, v, strict=True):

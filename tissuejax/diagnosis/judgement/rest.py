@@ -67,3 +67,21 @@ def numerical(scales: "Scales", parts: Sequence[Part], v: Float[np.ndarray, " K"
         x * np.mean(np.sum(p.factor**2, axis=1)) for p, x in zip(parts, v, strict=True) if p.family == "numerical"
     ]
     return math.sqrt(float(sum(squares))) / scales.peak
+
+
+def scatter(scales: "Scales", parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> Float[np.ndarray, " M"]:
+    """Variance of what scatters from sample to sample beside the stated noise, over the noise's, by block."""
+    extra = np.zeros(len(scales.blocked.sigma))
+    for part, x in zip(parts, v, strict=True):
+        if part.family == "white" and part.within is not None:
+            extra += x * np.concatenate([np.diag(b) for b in part.within])
+    return extra / scales.blocked.sigma**2
+
+
+def unlike_noise(scales: "Scales", parts: Sequence[Part], v: Float[np.ndarray, " K"], misstated: float) -> float:
+    """Mean square of the scatter that a level stated wrong by `misstated` doesn't make, over the squared peak: spikes,
+    teeth of stick and slip. Nothing where the level was not stated, or is of a simulation too."""
+    if scales.bench.estimated or scales.bench.costly:
+        return 0.0
+    beyond = np.maximum(scatter(scales, parts, v) - (misstated**2 - 1), 0.0)
+    return float(np.mean(beyond * scales.blocked.sigma**2)) / scales.peak**2

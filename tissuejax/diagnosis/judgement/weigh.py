@@ -27,7 +27,7 @@ from tissuejax.diagnosis.judgement.marginal import (
     smooth,
 )
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
-from tissuejax.diagnosis.judgement.rest import beyond, numerical, rest, wobble
+from tissuejax.diagnosis.judgement.rest import beyond, numerical, rest, unlike_noise, wobble
 from tissuejax.diagnosis.judgement.scales import Scales, log_prior, squared, with_priors
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.refit import Descent, Refit, refit
@@ -181,7 +181,7 @@ def weigh(
         at, tolerance = dict(fit.values), tolerance if bench.costly else 0.1
     if best is None:
         return _impossible(scales, keys)
-    return replace(_described(scales, keys, best), settled=anchor)
+    return replace(_described(scales, keys, best, criteria), settled=anchor)
 
 
 def _amplitudes(linear, parts, widths: Widths, blocked, v, anew: bool, both: bool) -> tuple[np.ndarray, Marginal]:
@@ -234,7 +234,7 @@ def _impossible(scales: Scales, keys: Sequence[str]) -> Weighed:
     return Weighed(low, fit, np.zeros(len(scales.families)), (), np.zeros(n))
 
 
-def _described(scales: Scales, keys: Sequence[str], best: Round) -> Weighed:
+def _described(scales: Scales, keys: Sequence[str], best: Round, criteria: Criteria) -> Weighed:
     fit, v, residual, parts, bench = best.fit, best.v, best.residual, best.parts, best.bench
     smoothed, scatter = rest(scales, parts, v, residual, scales.widened(keys))
     left, open_still = beyond(scales, best.linear, smoothed, scatter)
@@ -251,6 +251,7 @@ def _described(scales: Scales, keys: Sequence[str], best: Round) -> Weighed:
     )
     precision = best.m.precision
     own = 0.5 * float(np.linalg.slogdet(precision)[1]) if len(precision) else 0.0
+    spiky = unlike_noise(scales, parts, v, criteria.misstated)
     # what is left of the evidence when the parameters' width is taken out of it
     density = best.m.value - best.ahead + own
     evidence = SetEvidence(
@@ -268,7 +269,7 @@ def _described(scales: Scales, keys: Sequence[str], best: Round) -> Weighed:
         n=n,
         kurtosis=float(kurtosis(whitened)),
         explained=float(np.clip(1 - max(chi2 - n, 0.0) / base, -1.0, 1.0)),
-        rest=(float(np.mean(left**2 + open_still)), wobble(left, open_still, 1.0)),
+        rest=(float(np.mean(left**2 + open_still)) + spiky, wobble(left, open_still, 1.0)),
         numerical=numerical(scales, parts, v),
     )
     return Weighed(evidence, fit, v, parts, left * (scales.peak if scales.size is None else scales.size), bench)
