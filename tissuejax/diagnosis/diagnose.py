@@ -41,6 +41,7 @@ from tissuejax.recordings.recording import Sample
 from tissuejax.storage import write_json
 
 # a set of effects costs seconds where predictions are simulations
+WRONG = 1.2  # scatter over the stated noise from which that is not believed; few know theirs better
 PROBING = Effort(
     most=2,
     singles=5,
@@ -165,6 +166,11 @@ def diagnose(
     if found.evidence.exhausted:
         found.bench.warnings.append(
             "what may be spent on predictions was spent: larger sets of effects were not all weighed"
+        )
+    if found.noise_level > WRONG:
+        found.bench.warnings.append(
+            f"check the noise level: what is left scatters from sample to sample {found.noise_level:.1f} times as much "
+            "as the noise that was stated, which missing physics does not; the larger level was used"
         )
     made.seconds = time.perf_counter() - begun
     if out is not None:

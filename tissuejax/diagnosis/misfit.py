@@ -11,7 +11,6 @@ from tissuejax.estimation.correlation import Series, estimate
 from tissuejax.estimation.noise import Noise
 
 WHITE = Noise()
-WRONG = 1.2  # white noise over the recorded level from which the recorded one is not believed; few know theirs better
 Place = tuple[str, str]  # recording, channel
 
 
@@ -21,15 +20,11 @@ class Misfit:
 
     Attributes:
         bench: the sample on the table.
-        noises: by recording and channel, in units of the recorded standard deviation: 1 all in all, or more where the
-            residuals hold more white noise than was recorded; white where none is named.
-        levels: by recording and channel, the noise's standard deviation over the recorded one as the residuals have
-            it, mismatch left aside, where that was estimated.
+        noises: by recording and channel, in units of the recorded standard deviation; white where none is named.
     """
 
     bench: Bench
     noises: Mapping[Place, Noise] = field(default_factory=dict)
-    levels: Mapping[Place, float] = field(default_factory=dict)
 
     def rows(self, recordings: Sequence[str]) -> list[Segment]:
         """Segments of `recordings`."""
@@ -53,36 +48,9 @@ class Misfit:
         """Whitened (measured - predicted)."""
         return self.whiten(self.bench.y - prediction, recordings)
 
-    def effective(self, recordings: Sequence[str]) -> float:
-        """Number of independent samples, for smooth signals."""
-        return sum(self.noise(s).effective(s.time) for s in self.rows(recordings))
-
     def count(self, recordings: Sequence[str]) -> int:
         """Number of samples."""
         return sum(len(s.time) for s in self.rows(recordings))
-
-    def differs(self, other: "Misfit") -> bool:
-        """Whether the noise of `other` is another one as far as samples of these recordings tell."""
-        for s in self.bench.segments:
-            if len(s.time) > 1:
-                step = float(np.median(np.diff(s.time)))
-                one, two = self.noise(s), other.noise(s)
-                near = abs(float(one.correlation(step)) - float(two.correlation(step)))
-                if near > 0.05 or abs(one.share - two.share) > 0.1 or abs(one.std / two.std - 1) > 0.05:
-                    return True
-        return False
-
-    def remarks(self) -> list[str]:
-        """What is said where white noise exceeds the recorded level."""
-        seen = {r: max(level for (name, _), level in self.levels.items() if name == r) for r, _ in self.levels}
-        wrong = {r: level for r, level in seen.items() if level > WRONG}
-        if not wrong:
-            return []
-        said = ", ".join(f"{level:.1f} times in {r}" for r, level in wrong.items())
-        return [
-            f"check the noise level: what is left is white but larger than the recorded noise ({said}), which missing "
-            "physics is not; the larger level was used in all that follows"
-        ]
 
 
 def white(bench: Bench) -> Misfit:
@@ -95,22 +63,20 @@ def estimated(bench: Bench, prediction: Float[np.ndarray, " N"]) -> Misfit:
 
     Held-out recordings take no part; theirs is that of the fitted ones, of the longest where these differ.
     """
-    noises, levels = {}, {}
+    noises = {}
     for channel in dict.fromkeys(s.channel for s in bench.segments):
         blocks: dict[str, list[Segment]] = {}
         for s in bench.segments:
             if s.channel == channel and s.recording in bench.fitted:
                 blocks.setdefault(s.recording, []).append(s)
+        alike = ([s for s in own if len(s.time) == len(own[0].time)] for own in blocks.values())
         series = [
             Series(own[0].time, np.stack([(bench.y - prediction)[s.rows] / bench.sigma[s.rows] for s in own], axis=1))
-            for own in blocks.values()
+            for own in alike
         ]
         found = estimate(series)
-        for name, noise, level in zip(blocks, found.noises, found.levels):
-            too_large = level > WRONG and noise.share == 0
-            noises[name, channel] = noise.scaled(level) if too_large else noise
-            levels[name, channel] = level
+        noises |= {(name, channel): noise for name, noise in zip(blocks, found.noises, strict=True)}
         if blocks:
             longest = max(blocks, key=lambda name: len(blocks[name][0].time))
             noises |= {(name, channel): noises[longest, channel] for name in bench.held_out}
-    return Misfit(bench, noises, levels)
+    return Misfit(bench, noises)

@@ -14,9 +14,10 @@ the model of Kennedy and O'Hagan (2001), with the parts that rests of material t
 | waning gain | the stress times exponential in time (0.5 of the recording): stiffness that comes and goes, or is lost |
 | white | what scatters from sample to sample beyond the stated noise |
 
-Amplitudes a_k are shares of the stress that the model predicts (law, gain, waning gain), of its peak in the recording (hysteresis),
-or of the measured peak there (slow, white). Of what the model predicts: about the stress of another model a gain could
-bring that model's answer in, and about the measured peak a part that all specimens share would carry how they differ.
+Amplitudes a_k are shares of the stress that the model predicts (law, gain, waning gain), of its peak in the recording
+(hysteresis), or of the measured peak there (slow, white). Of what the model predicts: about the stress of another model
+a gain could bring that model's answer in, and about the measured peak a part that all specimens share would carry how
+they differ.
 
 Source: Kennedy and O'Hagan 2001, J. R. Statist. Soc. B 63; the loading state: Krasnosel'skii and Pokrovskii 1989.
 """

@@ -20,6 +20,7 @@ from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.explore import Effort, Exploration, explore
 from tissuejax.diagnosis.judgement.judge import Judgement, Kind, covering, judge
+from tissuejax.diagnosis.judgement.rest import level
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.misfit import Misfit, white
 from tissuejax.diagnosis.refit import Refit, refit
@@ -128,6 +129,12 @@ class Answered:
             "named": {p.name: s.amplitudes[p.name] for p in w.parts if p.family in named},
             "kurtosis": s.kurtosis,
         }
+
+    @property
+    def noise_level(self) -> float:
+        """What scatters from sample to sample beside the chosen set, over the stated noise."""
+        w = self.exploration.weighed[frozenset(self.judgement.chosen.keys)]
+        return level(self.exploration.scales, w.parts, w.v)
 
     def rest_size(self) -> Float[np.ndarray, " N"]:
         """Root mean square of the rest at every sample, SI: the same share of every channel."""

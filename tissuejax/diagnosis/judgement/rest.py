@@ -85,3 +85,8 @@ def unlike_noise(scales: "Scales", parts: Sequence[Part], v: Float[np.ndarray, "
         return 0.0
     beyond = np.maximum(scatter(scales, parts, v) - (misstated**2 - 1), 0.0)
     return float(np.mean(beyond * scales.blocked.sigma**2)) / scales.peak**2
+
+
+def level(scales: "Scales", parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> float:
+    """What scatters from sample to sample over the stated noise; 1 where that was not stated."""
+    return 1.0 if scales.bench.estimated else math.sqrt(1 + float(np.median(scatter(scales, parts, v))))

@@ -1,0 +1,90 @@
+"""What is noise and what is not: correlated noise is no rest, a level stated too low is none, spikes are one."""
+
+import numpy as np
+import pytest
+
+from tissuejax.diagnosis.diagnose import diagnose
+from tissuejax.diagnosis.judgement.coloured import means_covariance
+from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.estimation.noise import Noise
+from tissuejax.recordings.recording import Channel, Recording, Sample
+
+MU, NOISE, STEP = 900.0, 6.0, 0.05
+QUICK = Effort(most=1, singles=4, reshaped=(1, 0, 0), starts=1)
+
+
+def test_the_covariance_of_means_is_the_mean_of_the_covariance(rng):
+    time = np.cumsum(rng.uniform(0.01, 0.4, 60))
+    sigma, starts = rng.uniform(0.5, 2, 60), np.array([0, 1, 9, 30, 31, 52])
+    noise = Noise.shaped(0.7, 0.6)
+    averages = np.zeros((len(starts), len(time)))
+    for k, (a, b) in enumerate(zip(starts, [*starts[1:], len(time)], strict=True)):
+        averages[k, a:b] = 1 / (b - a)
+    lag = np.abs(time[:, None] - time)
+    dense = (0.7 * np.exp(-lag / 0.6) + 0.3 * np.eye(60)) * np.outer(sigma, sigma)
+    assert np.allclose(means_covariance(noise, time, sigma, starts), averages @ dense @ averages.T, rtol=1e-10)
+
+
+def recorded(disturbed, stated=NOISE) -> Sample:
+    """Pulls and pushes with holds of a neo-Hookean specimen in closed form, and what `disturbed` makes of them."""
+    rng, made = np.random.default_rng(11), {}
+    for name, far, ramp in (("slow", 1.3, 6.0), ("quick", 1.25, 1.0), ("push", 0.8, 2.5), ("last", 1.2, 1.5)):
+        time = np.arange(0, 3 * ramp + 12, STEP)
+        stretch = np.interp(time, [0, 1, 1 + ramp, 9 + ramp, 9 + 2 * ramp], [1, 1, far, far, 1])
+        y = disturbed(rng, time, MU * (stretch - stretch**-2))
+        channel = Channel(time, y, "Pa", stated)
+        told = {"area": 1e-4, "height": 0.01}
+        made[name] = Recording(name, "uniaxial", {"time": time, "stretch": stretch}, {"nominal_stress": channel}, told)
+    return Sample("noise", made)
+
+
+def carried(rng, time, stress, rho=0.9):
+    """First-order recursion of unit variance (Jones 1980), times the stated level."""
+    e = np.zeros(len(time))
+    e[0] = rng.standard_normal()
+    for i in range(1, len(time)):
+        e[i] = rho * e[i - 1] + np.sqrt(1 - rho**2) * rng.standard_normal()
+    return stress + NOISE * e
+
+
+def spiky(rng, time, stress):
+    hit = rng.random(len(time)) < 0.06
+    return stress + NOISE * (rng.standard_normal(len(time)) + 40 * hit * rng.standard_normal(len(time)))
+
+
+def waxing(rng, time, stress):
+    return stress * (1 + 0.15 * np.sin(2 * np.pi * time / 11 + 1.0)) + NOISE * rng.standard_normal(len(time))
+
+
+TRIED = ("drift", "periodic", "load-cell-bend", "viscoelasticity")
+
+
+def asked(sample):
+    return diagnose(sample, "neo-hookean", effects=TRIED, effort=QUICK)
+
+
+def test_noise_that_is_carried_from_sample_to_sample_is_no_rest():
+    answer = asked(recorded(carried))
+    assert answer.verdict.kind == "nothing-missing"
+    assert answer.as_dict()["rest"]["share_of_peak"] < 0.004
+
+
+@pytest.mark.parametrize(
+    ("disturbed", "verdict", "level"),
+    [
+        (lambda rng, t, s: s + 1.8 * NOISE * rng.standard_normal(len(t)), "nothing-missing", 1.8),
+        (spiky, "unexplained", np.sqrt(1 + 0.06 * 40**2)),
+    ],
+    ids=["stated too low", "spikes"],
+)
+def test_scatter_up_to_twice_the_stated_level_is_noise_and_spikes_are_not(disturbed, verdict, level):
+    answer = asked(recorded(disturbed))
+    assert answer.verdict.kind == verdict
+    assert answer.verdict.noise_level == pytest.approx(level, rel=0.35)  # a share of each recording's peak
+    assert any("check the noise level" in w for w in answer.as_dict()["warnings"])
+
+
+def test_stiffness_that_comes_and_goes_is_no_periodic_load():
+    answer = asked(recorded(waxing))
+    assert "periodic" not in [e["name"] for e in answer.as_dict()["effects"]]
+    assert answer.verdict.kind == "unexplained"
