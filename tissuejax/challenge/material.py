@@ -1,7 +1,7 @@
 """A challenge specimen as data, and the stress its load cell reports: body, then memory, then rig, then sensor.
 
 From the actuator inwards the drive passes a slip, slack, the rig's spring and the permanent set; from the specimen
-outwards the stress passes damage, relaxation, aging, platens, rubbing, and last the sensor with its drift.
+outwards the stress passes damage, relaxation, aging, platens, and last the sensor with its drift.
 """
 
 from dataclasses import dataclass, field, replace
@@ -128,10 +128,7 @@ def specimen_stress(specimen: Specimen, trial: Trial, drive: History) -> History
         factor = factor * rig_laws.aging_factor(trial, old.law, old.amount, **old.shape)
     if (plate := specimen.get("platen-friction")) and trial.kind == "uniaxial":
         factor = factor * rig_laws.platen_factor(drive, plate.law, plate.amount, trial.diameter, trial.height)
-    P = P * factor.reshape(-1, *([1] * (P.ndim - 1)))
-    if rub := specimen.get("rubbing"):
-        P = P + stray_laws.rubbing(drive - trial.rest, rub.amount, **rub.shape)
-    return P
+    return P * factor.reshape(-1, *([1] * (P.ndim - 1)))
 
 
 def relaxed(slow: Ingredient, trial: Trial, s: History, size: Float[np.ndarray, " n"]) -> History:
@@ -156,8 +153,8 @@ def sensed(specimen: Specimen, trial: Trial, P: History) -> History:
             P = stray_laws.cured(trial, P, stray.amount, **stray.shape)
         elif stray.name == "stick-slip":
             P = P + stray_laws.stick_slip(trial, stray.amount, **stray.shape)
-        elif stray.name == "bent-cell":
-            P = stray_laws.bent_cell(P, stray.amount, **stray.shape)
+        elif stray.name == "flicker":
+            P = stray_laws.flicker(P, stray.amount, np.random.default_rng([stray.shape["seed"], len(trial.time)]))
         elif stray.name == "drift":
             P = P + rig_laws.drift(trial, stray.law, *(stray.amount * np.array(stray.shape["mix"]))).reshape(column)
         elif stray.name == "periodic":
@@ -167,6 +164,8 @@ def sensed(specimen: Specimen, trial: Trial, P: History) -> History:
             P = P + stray_laws.spikes(len(P), stray.amount, stray.shape["share"], rng).reshape(column)
     if late := specimen.get("skipped"):
         P = stray_laws.skipped(trial, P, late.amount, **late.shape)
+    if still := specimen.get("frozen"):
+        P = stray_laws.frozen(trial, P, still.amount, **still.shape)
     if full := specimen.get("saturated"):
         P = stray_laws.saturated(P, full.amount)
     if coarse := specimen.get("stepped"):

@@ -195,10 +195,10 @@ STRAY: tuple[Choice, ...] = (
         lambda rng, s: {"period": _log(rng, 8, 40), "phase": rng.uniform(0, 6.28)},
         plain=False,
     ),
-    Choice("rubbing", "", 0.3, 60.0, _strays(0.005, 0.03, "travel"), "noise", plain=False),
+    Choice("frozen", "", 0.1, 6.0, _strays(0.1, 0.8, "where"), plain=False),
     Choice("cured", "", 0.005, 0.8, lambda rng, s: {"time": _log(rng, 1.0, 5.0)}, plain=False),
     Choice("skipped", "", 0.05, 2.0, _strays(0.2, 0.7, "where"), plain=False),
-    Choice("bent-cell", "", 0.01, 0.8, lambda rng, s: {"scale": s.top}, plain=False),
+    Choice("flicker", "", 0.005, 0.6, lambda rng, s: {"seed": int(rng.integers(1 << 30))}, plain=False),
     Choice("stick-slip", "", 0.5, 40.0, _strays(0.01, 0.05, "travel"), "noise", plain=False),
     Choice(
         "spikes",

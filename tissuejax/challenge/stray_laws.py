@@ -67,9 +67,17 @@ def skipped(trial: Trial, P: History, amount: float, where: float) -> History:
     return np.stack([np.interp(source, t, c) for c in columns.T], -1).reshape(P.shape)
 
 
-def bent_cell(P: History, amount: float, scale: float) -> History:
-    """Load cell whose reading bends differently pushed and pulled: P + amount P |P| / scale."""
-    return P + amount * P * np.abs(P) / scale
+def flicker(P: History, amount: float, rng: np.random.Generator) -> History:
+    """Supply of the bridge that trembles: every reading is off by a share of itself, `amount` in root mean square."""
+    return P * (1 + amount * rng.normal(size=len(P))).reshape(-1, *([1] * (P.ndim - 1)))
+
+
+def frozen(trial: Trial, P: History, amount: float, where: float) -> History:
+    """Recorder that keeps its last reading for `amount` seconds, from a share `where` of the recording on."""
+    t = trial.time
+    at = t[0] + where * (t[-1] - t[0])
+    source = np.where((t >= at) & (t < at + amount), np.searchsorted(t, at), np.arange(len(t)))
+    return P[source]
 
 
 def stick_slip(trial: Trial, amount: float, travel: float) -> History:
