@@ -24,9 +24,13 @@ types: $(STAMP)
 	$(BIN)/basedpyright --pythonpath $(BIN)/python
 
 # A thread a worker: small matrices on two threads each, twice over, wait for one another. A file stays with one
-# worker, which compiles what its tests share once.
+# worker, which compiles what its tests share once. Most of the time is compiling: tests run on code that XLA makes in
+# half the time and that runs half as fast; `make test QUICK=` and `make slow` compile as users do.
+QUICK ?= --xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=2
+
 test: lint types docs
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -q --durations=15
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 XLA_FLAGS="$(QUICK)" \
+	    $(BIN)/python -m pytest -n 2 --dist loadfile -q --durations=15
 
 slow: $(STAMP)
 	$(BIN)/python -m pytest -q -m slow
