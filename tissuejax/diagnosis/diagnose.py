@@ -21,7 +21,7 @@ from tissuejax.diagnosis.known import known_physics, label, tell
 from tissuejax.diagnosis.material import MaterialBench, strain_states
 from tissuejax.diagnosis.next_experiment import proposals, settling
 from tissuejax.diagnosis.next_probing import probing_proposals
-from tissuejax.diagnosis.offered import HYSTERESIS, SCATTER, offered
+from tissuejax.diagnosis.offered import HYSTERESIS, SCATTER, offered, paced
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_map import stiffness_maps
 from tissuejax.diagnosis.probing_view import ProbingView, probing_blocks, probing_discrepancy
@@ -160,7 +160,8 @@ def diagnose(
         else:
             cut = blocks(whole)
             states = strain_states(whole) if kind == "homogeneous" else driven_states(whole)
-            of = discrepancy(series(whole, cut, states), cut.spread(whole.sigma))
+            changing = kind == "homogeneous" and paced(sample)
+            of = discrepancy(series(whole, cut, states), cut.spread(whole.sigma), changing)
         found = answer(bench, whole, cut, of, effort, noted)
         made = {"homogeneous": _material, "probing": _probing, "cutting": _cutting}[kind](sample, energy, base, found)
     if found.evidence.exhausted:

@@ -132,6 +132,11 @@ def motion(time: np.ndarray, x: np.ndarray) -> tuple[bool, float, bool]:
     return turns, quick, still > HELD * float(np.ptp(time))
 
 
+def paced(sample: Sample) -> bool:
+    """Whether time was recorded and is more than a function of the strain: several rates, or holds."""
+    return timed(sample) and Protocol.of(sample).rates
+
+
 LACKING: Mapping[str, str] = {  # property of a protocol: what is said where it is not there
     "times": "recordings carry no times of their own in the session (`start`)",
     "directions": "all recordings load one direction",

@@ -117,7 +117,7 @@ class Discrepancy:
         own: factors of a law of each recording's own, about a stress of one; its series of a mode share it.
         turning: factors of hysteresis about a peak of one, by name.
         fixed: the parts that don't depend on the prediction.
-        fading: of a gain that changes in time, by series, how alike two samples are.
+        fading: of a gain that changes in time, by series, how alike two samples are; none where time says nothing.
     """
 
     laws: tuple[tuple[str, Float[np.ndarray, "N r"]], ...]
@@ -139,14 +139,17 @@ class Discrepancy:
             alike * np.outer(prediction[a:b], prediction[a:b])
             for alike, a, b in zip(self.fading, edges, edges[1:], strict=False)
         )
-        return (*laws, *several, *turning, *self.fixed, Part("waning gain", "slow", within=waning))
+        changing = (Part("waning gain", "slow", within=waning),) if waning else ()
+        return (*laws, *several, *turning, *self.fixed, *changing)
 
 
-def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"]) -> Discrepancy:
+def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"], paced: bool = False) -> Discrepancy:
     """The discrepancy of these series, stacked in their order.
 
     Args:
         sigma: noise of each entry, Pa; entries that are means of more samples scatter less.
+        paced: whether time is more than a function of the strain: else a gain that wanes is a law of each recording's
+            own, and that part is left out.
     """
     of = np.repeat(np.arange(len(series)), [len(s.time) for s in series])
     states = np.concatenate([s.states for s in series])
@@ -185,5 +188,5 @@ def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"]) -> Dis
         own,
         turning,
         tuple(out),
-        tuple(np.exp(-d / WANING) for d in apart),
+        tuple(np.exp(-d / WANING) for d in apart if paced),
     )

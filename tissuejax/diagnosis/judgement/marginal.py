@@ -26,6 +26,8 @@ from scipy.optimize import lsq_linear
 
 from tissuejax.estimation.discrepancy import Part
 
+JITTER = (1e-12, 1e-10, 1e-8)  # on the diagonal of a matrix of correlations: the least that factors
+
 
 @dataclass(frozen=True)
 class Linear:
@@ -140,14 +142,14 @@ def marginal(linear: Linear, parts: Sequence[Part], v: Float[np.ndarray, " K"], 
         return np.concatenate([i @ x[rows] for i, rows in zip(inverse, blocked.rows, strict=True)])
 
     u = smooth(parts, v)
-    p, q = linear.jacobian.shape[1], u.shape[1]
+    q = u.shape[1]
     w = np.concatenate([u, linear.jacobian], axis=1)
     prior = np.concatenate([np.ones(q), linear.weak])
     offset = np.concatenate([np.zeros(q), linear.offset])
     g = solve(w)
     m = w.T @ g + np.diag(prior)
     size = 1 / np.sqrt(np.maximum(np.diag(m), 1e-300))
-    c = cho_factor(m * np.outer(size, size) + 1e-12 * np.eye(p + q), lower=True, check_finite=False)
+    c = _factored(m * np.outer(size, size))
     dr = solve(linear.residual)
     b = g.T @ linear.residual - prior * offset
     found = size * cho_solve(c, size * b, check_finite=False)
@@ -164,6 +166,16 @@ def marginal(linear: Linear, parts: Sequence[Part], v: Float[np.ndarray, " K"], 
     last = np.tril(c[0])[q:, q:] / size[q:, None]  # of the factor: its square is the Schur complement H
     schur = last @ last.T
     return Marginal(value, schur, found[q:], derivatives)
+
+
+def _factored(unit: Float[np.ndarray, "w w"]) -> tuple[np.ndarray, bool]:
+    """Cholesky factor of a matrix with ones on its diagonal, which rounding may have made a little indefinite."""
+    for jitter in JITTER[:-1]:
+        try:
+            return cho_factor(unit + jitter * np.eye(len(unit)), lower=True, check_finite=False)
+        except np.linalg.LinAlgError:
+            continue
+    return cho_factor(unit + JITTER[-1] * np.eye(len(unit)), lower=True, check_finite=False)
 
 
 def _derivatives(
