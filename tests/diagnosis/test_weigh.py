@@ -22,13 +22,13 @@ MORE = {"fibre.k": Free(0, np.inf, 10), "fibre.onset": Free(0.01, 100, 1, log=Tr
 class Fibred(Spring):
     """The spring with fibres that bear beyond `onset`, and a parameter of the base that does nothing in these tests."""
 
-    most = np.inf
+    most, beyond = np.inf, np.inf
 
     def predict(self, values, recordings=None):
         v = {**self.start, **dict(values)}
         x = np.concatenate([s.drive for s in self.segments])
         added = v["fibre.k"] * np.maximum(x - v["fibre.onset"], 0.0)
-        bad = np.where(v["form.c"] > self.most, np.inf, 0.0)
+        bad = np.where(v["form.c"] > self.most, self.beyond, 0.0)
         return super().predict(values) + added + v["base.k"] * np.maximum(x - 2, 0) + bad
 
 
@@ -81,7 +81,9 @@ def test_a_parameter_of_the_base_that_does_nothing_is_left_alone(bench):
     assert more.refit.values["base.k"] == 1.0
 
 
-def test_a_set_that_can_not_be_predicted_is_void_and_not_ranked(bench):
+@pytest.mark.parametrize("beyond", [np.inf, 1e9])
+def test_a_set_that_can_not_be_predicted_is_void_and_not_ranked(bench, beyond):
+    bench.beyond = beyond
     on, base = scales(bench)
     bench.most = -1.0
     found = weigh(on, ("form",), base.refit.values, Criteria())

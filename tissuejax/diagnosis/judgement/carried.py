@@ -13,9 +13,10 @@ Source: Rasmussen and Williams 2006, Gaussian Processes for Machine Learning, eq
 
 import numpy as np
 from jaxtyping import Float
-from scipy.linalg import block_diag, cho_factor, cho_solve
+from scipy.linalg import block_diag, cho_solve
 
 from tissuejax.diagnosis.judgement.blocks import Blocks
+from tissuejax.diagnosis.judgement.marginal import factored
 from tissuejax.diagnosis.judgement.whitening import Whitening
 
 
@@ -39,7 +40,8 @@ def carried(whitening: Whitening, left: Float[np.ndarray, "N k"]) -> Float[np.nd
     for p, x in parts:
         if p.factor is not None:
             total = total + x * p.factor[known] @ p.factor[known].T
-    weight = cho_solve(cho_factor(total, lower=True), cut.mean(left)[known])
+    size = 1 / np.sqrt(np.diag(total))[:, None]
+    weight = size * cho_solve(factored(total * size * size.T), size * cut.mean(left)[known])
     named = (x * p.factor @ (p.factor[known].T @ weight) for p, x in parts if p.family in whitening.named)
     return between(cut, sum(named, np.zeros((len(cut.starts), left.shape[1]))))
 

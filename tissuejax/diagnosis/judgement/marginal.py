@@ -149,7 +149,7 @@ def marginal(linear: Linear, parts: Sequence[Part], v: Float[np.ndarray, " K"], 
     g = solve(w)
     m = w.T @ g + np.diag(prior)
     size = 1 / np.sqrt(np.maximum(np.diag(m), 1e-300))
-    c = _factored(m * np.outer(size, size))
+    c = factored(m * np.outer(size, size))
     dr = solve(linear.residual)
     b = g.T @ linear.residual - prior * offset
     found = size * cho_solve(c, size * b, check_finite=False)
@@ -168,7 +168,7 @@ def marginal(linear: Linear, parts: Sequence[Part], v: Float[np.ndarray, " K"], 
     return Marginal(value, schur, found[q:], derivatives)
 
 
-def _factored(unit: Float[np.ndarray, "w w"]) -> tuple[np.ndarray, bool]:
+def factored(unit: Float[np.ndarray, "w w"]) -> tuple[np.ndarray, bool]:
     """Cholesky factor of a matrix with ones on its diagonal, which rounding may have made a little indefinite."""
     for jitter in JITTER[:-1]:
         try:

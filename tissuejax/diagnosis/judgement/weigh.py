@@ -36,6 +36,7 @@ from tissuejax.estimation.discrepancy import Part
 ROUNDS = 4  # of fit and amplitudes in turn
 SETTLED = 0.1  # nats: a round that gains less is the last
 FELT = 1e-6  # of the peak: what is no rounding, by its slope
+WILD = 1e3  # of the peak: a prediction beyond that has no density, were it of one sample alone
 NOTHING = 1e-12  # of the peak: a change of the stress that is rounding
 
 
@@ -143,8 +144,8 @@ def weigh(
         near = bench.anchored(fit.values) if anchor else bench
         if near is not bench:
             bench, fit = near, replace(fit, prediction=near.predict(fit.values))
-        if not np.isfinite(squared(fit.prediction)):
-            break
+        if not np.max(np.abs(fit.prediction)) < WILD * scales.peak:
+            break  # shares of it would cover all that was measured
         residual, parts = y - scales.cut.mean(fit.prediction), scales.about(fit.prediction, bench)
         prior = [priors.get(p) for p in descent.paths]
         weak = np.array([0.0 if p is None else p[1] ** -2 for p in prior])
