@@ -133,6 +133,16 @@ def dense(part: Part) -> np.ndarray:
     return out
 
 
+def test_a_gain_that_wanes_is_a_share_of_the_stress_predicted_and_none_where_time_says_nothing(rng):
+    time, stress = np.linspace(0, 20, 50), rng.uniform(10, 90, 50)
+    one = Series("a", "", time, time[:, None], np.zeros((50, 3)), 100.0)
+    names = [p.name for p in discrepancy([one], np.ones(50)).about(stress)]
+    *rest, waning = discrepancy([one], np.ones(50), paced=True).about(stress)
+    assert [p.name for p in rest] == names
+    lag = np.abs(time[:, None] - time)
+    np.testing.assert_allclose(waning.within[0], np.outer(stress, stress) * np.exp(-lag / 10), rtol=1e-12)
+
+
 def test_slow_wander_is_a_share_of_the_peak_and_fades_in_time():
     """Every amplitude of one is the peak (100); the slow part of one series is correlated and that of two is not."""
     _, parts, _ = made()

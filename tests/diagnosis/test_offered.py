@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from tissuejax.diagnosis.bench import Candidate
-from tissuejax.diagnosis.offered import LACKING, Protocol, needs, offered
+from tissuejax.diagnosis.offered import LACKING, Protocol, needs, offered, paced
 from tissuejax.effects.catalogue import effects
 from tissuejax.energies.catalogue import energy
 from tissuejax.experiments.catalogue import experiment
@@ -52,6 +52,12 @@ def names(*stretches, **more):
 )
 def test_memory_needs_a_hold_or_a_way_back(stretch, seen):
     assert names(stretch) & {"viscoelasticity", "softening", "permanent-set", "hysteresis"} == seen
+
+
+@pytest.mark.parametrize(("stretch", "more"), [(RAMP, False), (HOLD, True), (CYCLE, True)])
+def test_time_is_more_than_strain_where_there_is_a_hold_or_a_way_back(stretch, more):
+    assert paced(sample(stretch)) == more
+    assert not paced(replace(sample(stretch), notes=NO_TIME))
 
 
 SLOW = ("effects.drift.rate", "effects.compressibility.drained")
