@@ -337,9 +337,12 @@ def source(parts=(54, 26, 30), toughness=5.0, strength=30e3) -> dict:
     tip = np.stack([x, 0 * x, np.full_like(x, height - deep)], 1)
     frames = 140
     scene = build.scene(
-        made.geometry, ReducedPolynomial(order=4), Quadratic(), IN_VIVO_3, dict(K=2e4), 981.0,
-        (np.arange(frames) + 0.5) * 0.7 / frames, joined=seam.pairs(made), mass_damping=20.0, hourglass=seam.HOURGLASS,
-    )  # fmt: skip
+        made.geometry,
+        build.Tissue(ReducedPolynomial(order=4), Quadratic(), IN_VIVO_3, dict(K=2e4), 981.0),
+        (np.arange(frames) + 0.5) * 0.7 / frames,
+        numerics=build.Numerics(mass_damping=20.0, hourglass=seam.HOURGLASS),
+        joined=seam.pairs(made),
+    )
     scene = seam.joined(scene, made, law("bilinear"), {"strength": strength, "energy": toughness})
     blade = Wedge(b, slope, seam.shoulder(b, slope, h), bottom=0.2e-3)
     scene = seam.armed(scene, made, blade, at, tip, friction=0.0).cast(jnp.float32)

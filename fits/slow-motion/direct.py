@@ -28,9 +28,12 @@ def body(size, counts, radius: float | None = None):
     """A block of the source's material, K 20 kPa, with a ball a millimetre above its middle where a radius is given."""
     path = None if radius is None else np.array([[0, 0, size[2] + radius + z] for z in (1e-3, -PRESS)])
     return build.scene(
-        box(size, counts), ReducedPolynomial(order=4), Quadratic(), POLYNOMIAL, dict(K=20e3), 1060.0, LIFE,
-        None if path is None else LIFE, path, radius, step=None if path is None else 1e-3,
-    ).cast(jnp.float32)  # fmt: skip
+        box(size, counts),
+        build.Tissue(ReducedPolynomial(order=4), Quadratic(), POLYNOMIAL, dict(K=20e3), 1060.0),
+        LIFE,
+        None if path is None else build.ProbePath(LIFE, path, radius),
+        numerics=build.Numerics(step=None if path is None else 1e-3),
+    ).cast(jnp.float32)
 
 
 def timed(calls: dict, each: int = 200, rounds: int = 5) -> dict:

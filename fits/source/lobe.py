@@ -41,9 +41,12 @@ def settled(
     geometry = body or columns(lobe(), counts, [np.zeros(2)], core=0.006, ratio=10.0, upward=UPWARD)
     energy = Ogden(form, MATERIAL.energy.order)
     scene = build.scene(
-        geometry, energy, Quadratic(), MATERIAL.constants, dict(K=K), DENSITY, np.arange(2.0),
-        gravity=(0, 0, gravity), hourglass=hourglass,
-    )  # fmt: skip
+        geometry,
+        build.Tissue(energy, Quadratic(), MATERIAL.constants, dict(K=K), DENSITY),
+        np.arange(2.0),
+        numerics=build.Numerics(hourglass=hourglass),
+        gravity=(0, 0, gravity),
+    )
     return geometry, np.asarray(statics.gradual(scene, tolerance=1e-6).displacement)
 
 
@@ -71,9 +74,14 @@ def press(geometry, u, radius: float, compression: float = COMPRESSION, hourglas
     path = np.stack([np.zeros(3), np.zeros(3), tip], 1)
     times = (np.arange(160) + 0.5) * end / 160
     return build.scene(
-        geometry, MATERIAL.energy, Quadratic(), MATERIAL.constants, dict(K=K), DENSITY, times, time, path,
-        shape=Hemisphere(radius), compression=compression, gravity=(0, 0, -G), settled=u, hourglass=hourglass,
-    )  # fmt: skip
+        geometry,
+        build.Tissue(MATERIAL.energy, Quadratic(), MATERIAL.constants, dict(K=K), DENSITY),
+        times,
+        build.ProbePath(time, path, Hemisphere(radius)),
+        numerics=build.Numerics(compression=compression, hourglass=hourglass),
+        gravity=(0, 0, -G),
+        settled=u,
+    )
 
 
 def pressed(geometry, u, radius: float, compression: float = COMPRESSION, hourglass: float = HOURGLASS) -> dict:

@@ -21,9 +21,11 @@ def main() -> None:
     t = np.linspace(0, 1.0, 101)
     position = np.stack([0 * t, 0 * t, 0.04 + 0.0048 - 0.008 * t], 1)
     scene = build.scene(
-        box((0.18, 0.115, 0.04), (14, 10, 5)), ReducedPolynomial(order=4), Quadratic(), VALUES, dict(K=20e3), 1060.0,
-        np.arange(60) / 60, t, position, 0.00475,
-    ).cast(jnp.float32)  # fmt: skip
+        box((0.18, 0.115, 0.04), (14, 10, 5)),
+        build.Tissue(ReducedPolynomial(order=4), Quadratic(), VALUES, dict(K=20e3), 1060.0),
+        np.arange(60) / 60,
+        build.ProbePath(t, position, 0.00475),
+    ).cast(jnp.float32)
     scenes = {"probe": scene, "alone": scene.put({"probe": None})}
     best = dict.fromkeys(scenes, float("inf"))
     for s in scenes.values():

@@ -36,9 +36,11 @@ def cube(n: int, order: int, dtype, steps: int = 0):
     steps = steps or max(50, round(4e5 / n**3))
     values = {f"C{i}0": VALUES[f"C{i}0"] for i in range(1, order + 1)}
     scene = build.scene(
-        box((0.1, 0.1, 0.1), (n, n, n)), ReducedPolynomial(order=order), Quadratic(), values, dict(K=2000.0), 981.0,
-        np.arange(20) * 1e-3, gravity=(0, 0, -9.81),
-    )  # fmt: skip
+        box((0.1, 0.1, 0.1), (n, n, n)),
+        build.Tissue(ReducedPolynomial(order=order), Quadratic(), values, dict(K=2000.0), 981.0),
+        np.arange(20) * 1e-3,
+        gravity=(0, 0, -9.81),
+    )
     step = 0.5 * float(scene.clock.step)  # a corner of 27,000 hexes stiffens beyond the safe step at rest
     return scene.put({"clock.interval": jnp.asarray(steps * step), "clock.steps": steps}).cast(dtype)
 

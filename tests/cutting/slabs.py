@@ -23,10 +23,13 @@ def cut(
     end = travel / speed
     times = (np.arange(frames) + 0.5) * end / frames
     scene = build.scene(
-        made.geometry, NeoHookean(), Quadratic(), {"mu": MU}, {"K": bulk}, 1000.0, times,
-        held=slice_held(made.geometry.points, half), joined=seam.pairs(made), mass_damping=damping,
-        hourglass=seam.HOURGLASS,
-    )  # fmt: skip
+        made.geometry,
+        build.Tissue(NeoHookean(), Quadratic(), {"mu": MU}, {"K": bulk}, 1000.0),
+        times,
+        numerics=build.Numerics(mass_damping=damping, hourglass=seam.HOURGLASS),
+        held=slice_held(made.geometry.points, half),
+        joined=seam.pairs(made),
+    )
     middle = np.asarray(made.geometry.points)[made.minus].mean(1)[:, 0]
     joint |= {"notch": (middle < notched).astype(float)} if notched else {}
     scene = seam.joined(scene, made, law(name), {"strength": strength, "energy": energy}, **joint)
@@ -41,9 +44,13 @@ def _apart(made, held, path, seconds, frames, values, bulk, **joint):
     points = np.asarray(made.geometry.points)
     times = (np.arange(frames) + 0.5) * seconds / frames
     scene = build.scene(
-        made.geometry, NeoHookean(), Quadratic(), {"mu": values.pop("mu", MU)}, {"K": bulk}, 1000.0, times, held=held,
-        joined=seam.pairs(made), mass_damping=values.pop("damping", 20.0), hourglass=values.pop("hourglass", 0.3),
-    )  # fmt: skip
+        made.geometry,
+        build.Tissue(NeoHookean(), Quadratic(), {"mu": values.pop("mu", MU)}, {"K": bulk}, 1000.0),
+        times,
+        numerics=build.Numerics(mass_damping=values.pop("damping", 20.0), hourglass=values.pop("hourglass", 0.3)),
+        held=held,
+        joined=seam.pairs(made),
+    )
     scene = seam.joined(scene, made, law("bilinear"), values, **joint)
     at = np.linspace(0, seconds, 401)
     motion = np.zeros((401, 3))

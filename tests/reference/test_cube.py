@@ -39,9 +39,13 @@ def cube(n: int, step: float):
     top = np.flatnonzero(g.points[:, 2] > 0.0999)
     markers = Markers(jnp.asarray(top[:, None], jnp.int32), jnp.ones((len(top), 1)), jnp.asarray(g.points[top]))
     scene = build.scene(
-        g, MATERIAL.energy, MATERIAL.volumetric, MATERIAL.constants, MATERIAL.volumetric_constants, 981.0,
-        np.arange(round(1.0 / step)) * step, mass_damping=25.0, gravity=(0, 0, -9.81), step=step, markers=markers,
-    )  # fmt: skip
+        g,
+        build.Tissue(MATERIAL.energy, MATERIAL.volumetric, MATERIAL.constants, MATERIAL.volumetric_constants, 981.0),
+        np.arange(round(1.0 / step)) * step,
+        numerics=build.Numerics(mass_damping=25.0, step=step),
+        gravity=(0, 0, -9.81),
+        markers=markers,
+    )
     return scene, -(np.asarray(run(scene).markers)[:, :, 2] - 0.1).reshape(-1, n + 1, n + 1) * 1e3
 
 

@@ -43,8 +43,12 @@ def compressed() -> tuple[float, float, float]:
     pattern[z[ends] > 1e-9, 2] = 1.0
     body = Geometry(g.points, g.cells, g.cell_type, ends)
     scene = build.scene(
-        body, energy, Quadratic(), values, dict(K=1e6), 1000.0, np.arange(2.0), held=held, hourglass=0.3,
-    )  # fmt: skip
+        body,
+        build.Tissue(energy, Quadratic(), values, dict(K=1e6), 1000.0),
+        np.arange(2.0),
+        numerics=build.Numerics(hourglass=0.3),
+        held=held,
+    )
     u, before = jnp.zeros_like(jnp.asarray(g.points)), 1.0
     for stretch in (0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, STRETCH):
         down = np.tile([0.0, 0.0, (stretch - 1) * HEIGHT], (2, 1))

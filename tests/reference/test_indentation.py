@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from tests.tled import cases
 from tissuejax.energies.reduced_polynomial import ReducedPolynomial
 from tissuejax.energies.volumetric import Quadratic
 from tissuejax.mesh.disc import disc
@@ -27,9 +28,14 @@ def scene(counts: tuple[int, int], speed: float, penalty: float = 1.0, **options
     end = DEEPEST / speed
     path = np.array([[0, 0, HEIGHT + BALL], [0, 0, HEIGHT + BALL - DEEPEST]])
     made = build.scene(
-        body.geometry, ReducedPolynomial(order=1), Quadratic(), dict(C10=1563.8 / 2), dict(K=20e3), 1000.0,
-        (np.arange(FRAMES) + 0.5) * end / FRAMES, np.array([0.0, end]), path, BALL, held=body.held, **options,
-    )  # fmt: skip
+        body.geometry,
+        build.Tissue(ReducedPolynomial(order=1), Quadratic(), dict(C10=1563.8 / 2), dict(K=20e3), 1000.0),
+        (np.arange(FRAMES) + 0.5) * end / FRAMES,
+        build.ProbePath(np.array([0.0, end]), path, BALL),
+        numerics=cases.numerics(options),
+        held=body.held,
+        **options,
+    )
     return made.put({"probe.penalty": made.probe.penalty * penalty, "probe.mass": made.probe.mass * penalty})
 
 

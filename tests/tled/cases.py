@@ -1,5 +1,7 @@
 """Small scenes that several tests share."""
 
+from dataclasses import fields
+
 import numpy as np
 
 from tissuejax.energies.reduced_polynomial import ReducedPolynomial
@@ -41,10 +43,22 @@ def surface_nodes(g: Geometry) -> np.ndarray:
     return np.flatnonzero(on)
 
 
+def numerics(options: dict) -> build.Numerics:
+    """How a scene is computed, taken out of the options of a case."""
+    names = {f.name for f in fields(build.Numerics)} & set(options)
+    return build.Numerics(**{name: options.pop(name) for name in names})
+
+
 def plain(g: Geometry, times, order=1, **options):
     """A scene without probe."""
     values = NEO if order == 1 else POLY
-    return build.scene(g, ReducedPolynomial(order=order), Quadratic(), values, BULK, 1000.0, times, **options)
+    return build.scene(
+        g,
+        build.Tissue(ReducedPolynomial(order=order), Quadratic(), values, BULK, 1000.0),
+        times,
+        numerics=numerics(options),
+        **options,
+    )
 
 
 RADIUS = 0.006
@@ -61,6 +75,10 @@ def pressed(g: Geometry | None = None, frames=40, order=2, **options):
     times = (np.arange(frames) + 0.5) * 0.5 / frames
     options = dict(compression=4.0) | options
     return build.scene(
-        g, ReducedPolynomial(order=order), Quadratic(), NEO if order == 1 else POLY, BULK, 1000.0, times, t, path,
-        RADIUS, **options,
-    )  # fmt: skip
+        g,
+        build.Tissue(ReducedPolynomial(order=order), Quadratic(), NEO if order == 1 else POLY, BULK, 1000.0),
+        times,
+        build.ProbePath(t, path, RADIUS),
+        numerics=numerics(options),
+        **options,
+    )

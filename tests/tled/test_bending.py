@@ -23,9 +23,11 @@ def sag(element: str | None, along: int, poisson: float, slender: float = 10.0) 
     body = Geometry(g.points, g.cells, g.cell_type, clamped)
     bulk = 2 * MU * (1 + poisson) / (3 * (1 - 2 * poisson))
     scene = build.scene(
-        body, ReducedPolynomial(order=1), Quadratic(), dict(C10=MU / 2), dict(K=bulk), 1000.0, np.arange(2.0) * 1e-3,
-        element_name=element,
-    )  # fmt: skip
+        body,
+        build.Tissue(ReducedPolynomial(order=1), Quadratic(), dict(C10=MU / 2), dict(K=bulk), 1000.0),
+        np.arange(2.0) * 1e-3,
+        numerics=build.Numerics(element=element),
+    )
     mesh = internal.mesh(scene)
     none = internal.rest(scene, mesh)
     tangent = jax.jit(jax.jacfwd(lambda u: internal.forces(scene, mesh, u, none, 0.0)[0]))(jnp.zeros((3, len(x))))

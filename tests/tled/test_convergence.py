@@ -67,9 +67,12 @@ def pressed(depth: float, counts, penalty: float = 1.0) -> float:
     steps = int(np.ceil(depth / 2.5e-4))  # m at a time: a jump as deep as an element turns it inside out
     path = np.array([[0, 0, LAYER + BALL], [0, 0, LAYER + BALL - depth]])
     scene = build.scene(
-        body.geometry, ReducedPolynomial(order=1), Quadratic(), dict(C10=MU / 2), dict(K=K), 1000.0, np.arange(2.0),
-        np.arange(2.0), path, BALL, held=body.held,
-    )  # fmt: skip
+        body.geometry,
+        build.Tissue(ReducedPolynomial(order=1), Quadratic(), dict(C10=MU / 2), dict(K=K), 1000.0),
+        np.arange(2.0),
+        build.ProbePath(np.arange(2.0), path, BALL),
+        held=body.held,
+    )
     scene = scene.put({"probe.penalty": scene.probe.penalty * penalty, "probe.mass": scene.probe.mass * penalty})
     for k in range(1, steps + 1):
         found = statics.checked(statics.compiled(scene, k / steps, tolerance=1e-6, margin=4.0))

@@ -36,9 +36,14 @@ def under_platen(height, time, counts=(3, 2, 2), **options):
     path = np.stack([0 * height, 0 * height, height], 1)
     times = np.linspace(time[0], time[-1], 61)[1:]
     return build.scene(
-        g, ReducedPolynomial(order=2), Quadratic(), cases.POLY, cases.BULK, 1000.0, times, time, path,
-        shape=Platen(), held=held, **options,
-    )  # fmt: skip
+        g,
+        build.Tissue(ReducedPolynomial(order=2), Quadratic(), cases.POLY, cases.BULK, 1000.0),
+        times,
+        build.ProbePath(time, path, Platen()),
+        numerics=cases.numerics(options),
+        held=held,
+        **options,
+    )
 
 
 def nominal(stretch: float, law: dict[str, float] = cases.POLY) -> float:

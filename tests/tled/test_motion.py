@@ -12,6 +12,7 @@ from tests.tled import cases
 from tissuejax.errors import InputError, UnstableSimulation
 from tissuejax.mesh.columns import box
 from tissuejax.tled import contact, internal, ledger, stream
+from tissuejax.tled.build import ProbePath
 from tissuejax.tled.simulate import compiled, run
 from tissuejax.tled.step import machine
 
@@ -110,13 +111,13 @@ def test_a_burst_names_the_element_in_which_it_began():
 def test_a_probe_that_starts_inside_or_stays_away_is_refused():
     g = box((0.03, 0.03, 0.012), (5, 5, 3))
     t = np.arange(3.0)
-    options = dict(probe_time=t, radius=0.006)
-    with pytest.raises(InputError, match="inside the tissue"):
-        cases.plain(g, t, probe_position=np.tile([0, 0, 0.015], (3, 1)), **options)
-    with pytest.raises(InputError, match="off the tissue"):
-        cases.plain(g, t, probe_position=np.tile([0, 0, 0.2], (3, 1)), **options)
-    with pytest.raises(InputError, match="radius"):
-        cases.plain(g, t, probe_time=t, probe_position=np.tile([0, 0, 0.2], (3, 1)))
+    for height, radius, words in (
+        (0.015, 0.006, "inside the tissue"),
+        (0.2, 0.006, "off the tissue"),
+        (0.2, 0.0, "radius"),
+    ):
+        with pytest.raises(InputError, match=words):
+            cases.plain(g, t, probe_path=ProbePath(t, np.tile([0, 0, height], (3, 1)), radius))
 
 
 def test_a_run_that_is_stopped_goes_on_bit_for_bit(tmp_path):

@@ -28,7 +28,7 @@ def solid(scene, u):
     return internal.forces(scene, mesh, u, internal.rest(scene, mesh), 1.0)[0]
 
 
-BENDING = {"element_name": "hexahedron-bending"}
+BENDING = {"element": "hexahedron-bending"}
 
 
 @pytest.mark.parametrize("kind", ["hexes", "bent hexes", "bent tets", "bending", "bent bending"])

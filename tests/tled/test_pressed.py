@@ -20,7 +20,13 @@ CUBE = box((0.02, 0.02, 0.02), (2, 2, 2))
 
 def tissue(energy, values, K=20e3, geometry=CUBE, **options):
     times = options.pop("times", np.arange(2.0) * 1e-3)
-    return build.scene(geometry, energy, Quadratic(), values, dict(K=K), 1000.0, times, **options)
+    return build.scene(
+        geometry,
+        build.Tissue(energy, Quadratic(), values, dict(K=K), 1000.0),
+        times,
+        numerics=cases.numerics(options),
+        **options,
+    )
 
 
 def test_stiffening_is_that_of_the_closed_form():
@@ -50,7 +56,7 @@ def block(depth: float, radius=0.004, counts=(8, 8, 5), energy=None, values=None
     options = dict(compression=10.0) | options
     return tissue(
         energy, cases.NEO if values is None else values, 15e3, g, times=(np.arange(25) + 0.5) * end / 25,
-        probe_time=np.array([0.0, end]), probe_position=path, radius=radius, **options,
+        probe_path=build.ProbePath(np.array([0.0, end]), path, radius), **options,
     )  # fmt: skip
 
 
@@ -117,7 +123,7 @@ def test_a_breakdown_away_from_the_probe_is_put_down_to_gravity_or_the_support()
     path = np.array([[0.0, 0.0, 0.047], [0.0, 0.0, 0.046]])
     scene = tissue(
         ReducedPolynomial(order=1), cases.NEO, 15e3, g, times=(np.arange(20) + 0.5) * 0.01, gravity=(0, 0, -981.0),
-        probe_time=np.array([0.0, 0.2]), probe_position=path, radius=0.005,
+        probe_path=build.ProbePath(np.array([0.0, 0.2]), path, 0.005),
     )  # fmt: skip
     with pytest.raises(UnstableSimulation, match="gravity or the support breaks it. The weight of the tissue's height"):
         run(scene)

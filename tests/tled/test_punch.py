@@ -69,9 +69,11 @@ def test_a_punch_feels_a_bonded_layer_as_thick_as_it_is_wide():
     top = height + RADIUS
     path = np.array([[0, 0, top + 1e-4], [0, 0, top - depth]])
     scene = build.scene(
-        g, ReducedPolynomial(order=1), Quadratic(), cases.NEO, {"K": 100 * mu}, 1000.0, np.array([0.25, 0.75]),
-        np.array([0.0, 1.0]), path, shape=Punch(jnp.asarray(RADIUS), jnp.asarray(1e-4)),
-    )  # fmt: skip
+        g,
+        build.Tissue(ReducedPolynomial(order=1), Quadratic(), cases.NEO, {"K": 100 * mu}, 1000.0),
+        np.array([0.25, 0.75]),
+        build.ProbePath(np.array([0.0, 1.0]), path, Punch(jnp.asarray(RADIUS), jnp.asarray(1e-4))),
+    )
     found = statics.checked(statics.compiled(scene, 1.0, tolerance=1e-5, margin=3.0))
     expected = 8 * mu * RADIUS * depth * layer_factor(RADIUS / height, 20)
     assert float(found.force[2]) == pytest.approx(expected, rel=0.08)

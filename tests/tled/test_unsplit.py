@@ -15,7 +15,9 @@ def test_bonet_and_woods_law_has_its_stress(rng):
     """S = mu (1 - C^-1) + lambda ln J C^-1, at strains with volume changes of some ten per cent; none at rest."""
     mu, lam = 700.0, 2500.0
     scene = build.scene(
-        box((0.02, 0.02, 0.02), (2, 2, 2)), NeoHookean(), Logarithmic(), {"mu": mu}, {"K": lam}, 1e3, np.arange(2.0)
+        box((0.02, 0.02, 0.02), (2, 2, 2)),
+        build.Tissue(NeoHookean(), Logarithmic(), {"mu": mu}, {"K": lam}, 1e3),
+        np.arange(2.0),
     )
     scene = scene.put({"tissue.added": (Unsplit(jnp.asarray(mu)),)})
     mesh = internal.mesh(scene)

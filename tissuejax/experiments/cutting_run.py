@@ -115,10 +115,13 @@ def prepare(model: Model, values: Mapping[str, float], density: float, path: Pat
         shear = float(model.energy.initial_shear_modulus(under("energy", values)))
         damping = CALM * 0.5 * np.pi * np.sqrt(shear / density) / path.half
     scene = build.scene(
-        made.geometry, model.energy, model.volumetric, under("energy", values), under("volumetric", values), density,
-        times, held=slice_held(np.asarray(made.geometry.points), path.half), joined=seam.pairs(made),
-        mass_damping=damping, hourglass=seam.HOURGLASS,
-    )  # fmt: skip
+        made.geometry,
+        build.Tissue(model.energy, model.volumetric, under("energy", values), under("volumetric", values), density),
+        times,
+        numerics=build.Numerics(mass_damping=damping, hourglass=seam.HOURGLASS),
+        held=slice_held(np.asarray(made.geometry.points), path.half),
+        joined=seam.pairs(made),
+    )
     middle = np.asarray(made.geometry.points)[made.minus].mean(1)[:, 0]
     cohesive = under("cohesion", values)
     strong = cohesive | {"strength": cohesive["strength"] * settings.strongest}

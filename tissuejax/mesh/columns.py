@@ -80,7 +80,7 @@ def columns(
     """Column hexes of a lobe; the nodes of the lowest layer are fixed.
 
     Keep elements that bend about as long as high: one plain hex through the height of a slender beam gives 96 % of the
-    deflection as a cube, 32 % twice as long, 6 % five times as long; `build.scene(element_name="hexahedron-bending")`
+    deflection as a cube, 32 % twice as long, 6 % five times as long; `build.Numerics(element="hexahedron-bending")`
     gives 99, 97 and 90 % (`tests/tled/test_bending.py`).
 
     Args:

@@ -7,6 +7,7 @@ that the probe can come near. What can't work is refused here, once, with a sent
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -15,8 +16,6 @@ from jaxtyping import Array, Float, Int
 from tissuejax import elements
 from tissuejax.elements.hex8 import Hex8, straight
 from tissuejax.elements.hex8_bending import Hex8Bending
-from tissuejax.energies.energy import Energy
-from tissuejax.energies.volumetric import Volumetric
 from tissuejax.errors import InputError
 from tissuejax.families import lookup, members
 from tissuejax.mesh.facets import area_vectors, boundary
@@ -46,88 +45,116 @@ def element(cell_type: str):
     return lookup("element", cell_type, members(elements, Element))()
 
 
+@dataclass(frozen=True)
+class ProbePath:
+    """A probe and the way it goes.
+
+    Attributes:
+        time: s; position: m; straight between.
+        shape: of the tip; a number is the radius of a ball, m.
+    """
+
+    time: Float[np.ndarray, " m"]
+    position: Float[np.ndarray, "m 3"]
+    shape: Shape | float
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """How a scene is computed; what is None is chosen.
+
+    Attributes:
+        step: s on the simulated clock; None is `SAFETY` times the critical one, less where the probe goes deep.
+        compression: factor f by which slow motion is run faster.
+        penalty: Pa/m; None is automatic. softness: m; None is a tenth of the penetration (`automatic_penalty`).
+        patch: nodes of the facets that may touch (automatic).
+        hourglass: in units of the shear modulus; None is the element's own (0.3 for the plain hex; 0.1 to 0.5).
+        mass_damping: 1/s; None is half the lowest shear frequency pi/2 c_s / height.
+        stiffness_damping: beta, s; 5e-5 s for forward tangents of slow runs.
+        element: None is the plain one for the cells; "hexahedron-bending" where elements are long or bend.
+    """
+
+    step: float | None = None
+    compression: float = 1.0
+    penalty: float | None = None
+    softness: float | None = None
+    patch: Float[np.ndarray, "P v"] | None = None
+    hourglass: float | None = None
+    mass_damping: float | None = None
+    stiffness_damping: float = 0.0
+    element: str | None = None
+
+
 def scene(
     geometry: Geometry,
-    energy: Energy,
-    volumetric: Volumetric,
-    energy_values: Mapping[str, float],
-    volumetric_values: Mapping[str, float],
-    density: float,
+    tissue: Tissue,
     times: Float[np.ndarray, " n"],
-    probe_time: Float[np.ndarray, " m"] | None = None,
-    probe_position: Float[np.ndarray, "m 3"] | None = None,
-    radius: float | None = None,
-    shape: Shape | None = None,
-    compression: float = 1.0,
-    step: float | None = None,
-    penalty: float | None = None,
-    hourglass: float | None = None,
-    mass_damping: float | None = None,
-    stiffness_damping: float = 0.0,
+    probe_path: ProbePath | None = None,
+    numerics: Numerics | None = None,
+    *,
     gravity: tuple[float, float, float] | None = None,
     markers: Markers | None = None,
     held: Float[np.ndarray, "F 3"] | None = None,
-    patch: Float[np.ndarray, "P v"] | None = None,
-    softness: float | None = None,
     joined: Int[np.ndarray, "J 2"] | None = None,
     settled: Float[np.ndarray, "N 3"] | None = None,
-    element_name: str | None = None,
 ) -> Scene:
     """A scene with every optional slot empty.
 
     Args:
         geometry: stress-free mesh (m), support nodes in `fixed`.
-        energy, volumetric, energy_values, volumetric_values: material; values by their own names (`C10`, `K`).
-        density: kg/m^3.
+        tissue: energies, their values by their own names (`C10`, `K`), density (kg/m^3).
         times: uniform output times (middles of the frames), real time, s.
-        probe_time, probe_position, radius or shape: the probe; None for none.
-        compression: factor f by which slow motion is run faster.
-        step: s on the simulated clock; None is `SAFETY` times the critical one, less where the probe goes deep.
-        penalty: Pa/m; None is automatic. softness: m; None is a tenth of the penetration (`automatic_penalty`).
-        hourglass: in units of the shear modulus; None is the element's own (0.3 for the plain hex; 0.1 to 0.5).
-        mass_damping: 1/s; None is half the lowest shear frequency pi/2 c_s / height.
-        stiffness_damping: beta, s; 5e-5 s for forward tangents of slow runs.
+        probe_path: None for no probe.
         gravity: m/s^2. markers: points to follow. held: which axes of the fixed nodes are held (all).
-        patch: nodes of the facets that may touch (automatic).
         joined: pairs of nodes that cohesive faces hold together, so that both halves count as one body.
-        element_name: None is the plain one for the cells; "hexahedron-bending" where elements are long or bend.
         settled: displacement at time zero, m, for example under gravity: where the probe finds the tissue.
 
     Raises:
         InputError: a bad mesh, a step above the critical one, a probe that starts inside the tissue or never comes
-            near, output times that are not uniform, a missing radius, values that are not positive.
+            near, output times that are not uniform, a radius or other values that are not positive.
     """
+    numerics = numerics or Numerics()
     refuse_bad(geometry, joined=joined)
     times = np.asarray(times, float)
     interval = _interval(times)
+    density = float(tissue.density)
     if not density > 0:
         raise InputError(f"density {density} kg/m^3: mass is needed by the explicit solver; tissue has about 1000")
+    tissue = replace(
+        tissue,
+        energy_values=_floats(tissue.energy_values),
+        volumetric_values=_floats(tissue.volumetric_values),
+        density=jnp.asarray(density),
+    )
     facets = boundary(geometry.cells, geometry.cell_type)
-    made = _element(geometry, element_name, energy, volumetric, energy_values, volumetric_values)
-    hourglass = made.natural_hourglass if hourglass is None else hourglass
+    made = _element(geometry, numerics.element, tissue)
     body = Body(
         jnp.asarray(geometry.points), jnp.asarray(geometry.cells, jnp.int32), jnp.asarray(geometry.fixed, jnp.int32),
         jnp.ones((len(geometry.fixed), 3)) if held is None else jnp.asarray(held, float),
         jnp.asarray(facets.nodes, jnp.int32), made,
         None if settled is None else jnp.asarray(settled, float),
     )  # fmt: skip
-    tissue = Tissue(energy, volumetric, _floats(energy_values), _floats(volumetric_values), jnp.asarray(float(density)))
-    if mass_damping is None:
+    hourglass = made.natural_hourglass if numerics.hourglass is None else numerics.hourglass
+    damping = numerics.mass_damping
+    if damping is None:
         height = float(np.ptp(np.asarray(geometry.points)[:, 2]))
-        speed = math.sqrt(float(energy.initial_shear_modulus(tissue.energy_values)) / density)
-        mass_damping = 0.5 * (math.pi / 2) * speed / height
-    settings = Settings(*(jnp.asarray(float(x)) for x in (hourglass, mass_damping, stiffness_damping)))
-    clock = Clock(*(jnp.asarray(float(x)) for x in (times[0] - interval / 2, interval, compression)), len(times), 1)
+        speed = math.sqrt(float(tissue.energy.initial_shear_modulus(tissue.energy_values)) / density)
+        damping = 0.5 * (math.pi / 2) * speed / height
+    settings = Settings(*(jnp.asarray(float(x)) for x in (hourglass, damping, numerics.stiffness_damping)))
+    began = times[0] - interval / 2
+    clock = Clock(*(jnp.asarray(float(x)) for x in (began, interval, numerics.compression)), len(times), 1)
     g = None if gravity is None else jnp.asarray(gravity, float)
     bare = Scene(body, tissue, clock, settings, Support(), None, markers, g)
-    shape = None if probe_position is None else _shape(shape, radius)
-    bare = bare.put({"clock.steps": steps(bare, step, shape, probe_position)})
-    if shape is None:
-        return bare
+    if probe_path is None:
+        return bare.put({"clock.steps": steps(bare, numerics.step)})
+    shape, position = _shape(probe_path.shape), probe_path.position
+    bare = bare.put({"clock.steps": steps(bare, numerics.step, shape, position)})
+    patch = numerics.patch
     if patch is None:
-        patch = _patch(facets.nodes, _now(bare), geometry.fixed, shape, probe_position)
+        patch = _patch(facets.nodes, _now(bare), geometry.fixed, shape, position)
     facets = np.asarray(patch)
-    return bare.put({"probe": probe(bare, shape, probe_time, probe_position, facets, penalty, softness)})
+    made = probe(bare, shape, probe_path.time, position, facets, numerics.penalty, numerics.softness)
+    return bare.put({"probe": made})
 
 
 def steps(bare: Scene, step: float | None, shape: Shape | None = None, position=None) -> int:
@@ -204,15 +231,15 @@ def _shear_modulus(bare: Scene) -> float:
     return float(bare.tissue.energy.initial_shear_modulus(bare.tissue.energy_values))
 
 
-def _element(geometry, name, energy, volumetric, energy_values, volumetric_values):
+def _element(geometry: Geometry, name: str | None, tissue: Tissue):
     made = element(geometry.cell_type if name is None else name)
     if made.cells != geometry.cell_type:
         raise InputError(f"element {name!r} has cells of type {made.cells!r}, but the mesh {geometry.cell_type!r}")
     if isinstance(made, Hex8):
         return Hex8(straight(geometry.points, geometry.cells))
     if isinstance(made, Hex8Bending):
-        bulk = float(volumetric.bulk_modulus(_floats(volumetric_values)))
-        shear = float(energy.initial_shear_modulus(_floats(energy_values)))
+        bulk = float(tissue.volumetric.bulk_modulus(tissue.volumetric_values))
+        shear = float(tissue.energy.initial_shear_modulus(tissue.energy_values))
         poisson = (3 * bulk - 2 * shear) / (2 * (3 * bulk + shear))
         return Hex8Bending(round(min(max(poisson, 0.0), 0.5), 2))
     return made
@@ -233,12 +260,12 @@ def _interval(times):
     return (times[-1] - times[0]) / (len(times) - 1)
 
 
-def _shape(shape, radius):
-    if shape is not None:
+def _shape(shape: Shape | float) -> Shape:
+    if isinstance(shape, Shape):
         return shape
-    if radius is None or not radius > 0:
-        raise InputError(f"probe radius {radius}: a spherical tip needs its radius in m, for example 0.00475")
-    return Sphere(jnp.asarray(float(radius)))
+    if shape is None or not shape > 0:
+        raise InputError(f"probe radius {shape}: a spherical tip needs its radius in m, for example 0.00475")
+    return Sphere(jnp.asarray(float(shape)))
 
 
 def _distance(shape, x):
@@ -298,4 +325,6 @@ def _refuse_inside(made: Probe, points, start):
         )
 
 
-__all__ = ["Hemisphere", "Platen", "Punch", "Sphere", "scene", "element", "probe", "steps"]
+__all__ = [
+    "Hemisphere", "Numerics", "Platen", "ProbePath", "Punch", "Sphere", "Tissue", "element", "probe", "scene", "steps",
+]  # fmt: skip

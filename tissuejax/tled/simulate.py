@@ -2,8 +2,9 @@
 
 What others build on (stable):
 
-    scene = build.scene(geometry, energy, volumetric, energy_values, volumetric_values, density=..., probe_time=...,
-                        probe_position=..., radius=..., times=...)      # host: chooses step, penalty, patch; refuses
+    tissue = build.Tissue(energy, volumetric, energy_values, volumetric_values, density)
+    path = build.ProbePath(probe_time, probe_position, radius)
+    scene = build.scene(geometry, tissue, times, path)      # host: chooses step, penalty, patch; refuses
     scene = scene.put({"tissue.energy_values.C10": c, "probe.friction": 0.2, "tissue.stiffness": field})
     out = simulate(scene)                    # pure JAX: jit, jvp, vjp work from outside; the scene is a pytree argument
     out = run(scene)                         # the same, jitted, and checked (`verdict`): raises UnstableSimulation
