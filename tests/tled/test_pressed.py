@@ -15,6 +15,7 @@ from tissuejax.tled import build, gravity, pressed, statics
 from tissuejax.tled.shapes import Hemisphere
 from tissuejax.tled.simulate import run
 
+BALL = 0.004  # m
 CUBE = box((0.02, 0.02, 0.02), (2, 2, 2))
 
 
@@ -47,16 +48,16 @@ def test_waves_cross_a_squeezed_element_sooner():
     assert pressed.quickening(scene, 0.5) == pytest.approx(2.0, rel=0.03)
 
 
-def block(depth: float, radius=0.004, counts=(8, 8, 5), energy=None, values=None, **options):
+def block(depth: float, shape=BALL, counts=(8, 8, 5), energy=None, values=None, **options):
     """A block of 24 x 24 x 10 mm, the ball pressed in by `depth` at 2 mm/s, run ten times as fast."""
     g = box((0.024, 0.024, 0.010), counts)
     end = depth / 0.002
-    path = np.array([[0.0, 0.0, 0.010 + radius], [0.0, 0.0, 0.010 + radius - depth]])
+    path = np.array([[0.0, 0.0, 0.010 + BALL], [0.0, 0.0, 0.010 + BALL - depth]])
     energy = ReducedPolynomial(order=1) if energy is None else energy
     options = dict(compression=10.0) | options
     return tissue(
         energy, cases.NEO if values is None else values, 15e3, g, times=(np.arange(25) + 0.5) * end / 25,
-        probe_path=build.ProbePath(np.array([0.0, end]), path, radius), **options,
+        probe_path=build.ProbePath(np.array([0.0, end]), path, shape), **options,
     )  # fmt: skip
 
 
@@ -92,7 +93,7 @@ def test_a_ball_that_sinks_through_the_surface_is_refused_with_time_place_and_re
 def stiffening(**options):
     """Ex vivo law, a hemisphere pressed to 45 % of the thickness."""
     material = published("ex-vivo-ogden")
-    return block(4.5e-3, shape=Hemisphere(0.004), energy=material.energy, values=material.constants, **options)
+    return block(4.5e-3, shape=Hemisphere(BALL), energy=material.energy, values=material.constants, **options)
 
 
 def test_the_penalty_holds_where_the_law_stiffens_a_hundredfold():
