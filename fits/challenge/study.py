@@ -15,7 +15,8 @@ from tissuejax.storage import write_json, write_text
 VISIBLE = 3.0
 BEGIN, END = "<!-- pooled: written by the study -->", "<!-- end of pooled -->"
 CURRENT = {
-    "material": ("material", "material-second", "material-third", "material-fourth", "material-fifth"),
+    "material": ("material", "material-second", "material-third", "material-fourth", "material-fifth",
+                 "material-sixth"),
     "probing": ("probing", "probing-strong", "probing-strong-second", "probing-pairs", "probing-second",
                 "probing-strong-third"),
 }  # fmt: skip
