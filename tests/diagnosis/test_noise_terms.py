@@ -8,6 +8,7 @@ from tissuejax.diagnosis.judgement.coloured import means_covariance
 from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.estimation.noise import Noise
 from tissuejax.recordings.recording import Channel, Recording, Sample
+from tissuejax.report.judged_sentences import sure
 
 MU, NOISE, STEP = 900.0, 6.0, 0.05
 QUICK = Effort(most=1, singles=4, reshaped=(1, 0, 0), starts=1)
@@ -88,3 +89,4 @@ def test_stiffness_that_comes_and_goes_is_no_periodic_load():
     answer = asked(recorded(waxing))
     assert "periodic" not in [e["name"] for e in answer.as_dict()["effects"]]
     assert answer.verdict.kind == "unexplained"
+    assert any("a gain that changes while it is recorded" in sentence for sentence in sure(answer))

@@ -11,7 +11,8 @@ from spring_bench import FREE, START, Spring, spring
 from tissuejax.diagnosis.bench import Candidate, Free
 from tissuejax.diagnosis.judgement.blocks import blocks, driven_states, series
 from tissuejax.diagnosis.judgement.criteria import Criteria
-from tissuejax.diagnosis.judgement.explore import Effort, Exploration, scaled
+from tissuejax.diagnosis.judgement.explore import Effort, Exploration
+from tissuejax.diagnosis.judgement.scales import scaled
 from tissuejax.diagnosis.judgement.weigh import weigh
 from tissuejax.estimation.discrepancy import discrepancy
 

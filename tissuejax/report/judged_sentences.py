@@ -16,6 +16,7 @@ PARTS = {
     "quick": "a quick wander in time",
     "slow": "a slow wander in time",
     "lasting": "a wander longer than a recording",
+    "waning gain": "a gain that changes while it is recorded",
     "white": "scatter from sample to sample beyond the stated noise",
     "marker": "each marker's own, smooth in depth",
     "numerical": "what mesh and step of the simulation leave open",

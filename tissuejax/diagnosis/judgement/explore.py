@@ -19,8 +19,7 @@ from tissuejax.diagnosis.judgement.coloured import coloured
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.judge import log_prior
-from tissuejax.diagnosis.judgement.marginal import Blocked
-from tissuejax.diagnosis.judgement.scales import Scales, squared
+from tissuejax.diagnosis.judgement.scales import Scales, scaled, squared
 from tissuejax.diagnosis.judgement.weigh import ROUNDS, Weighed, weigh
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.score import Score, complement, gain, trusted
@@ -302,10 +301,15 @@ class Exploration:
         while left := [k for k in self.near(size) if not self.weighed[k].settled]:
             w = self.weighed[left[0]]
             self._tell("settling", w.evidence.keys)
-            effort = {"rounds": self.effort.rounds, "iterations": self.effort.iterations}
-            self.weighed[left[0]] = weigh(
-                self.scales, w.evidence.keys, w.refit.values, self.criteria, v=w.v, bench=w.bench, **effort
-            )
+            at = w.refit.values
+            again = self._settled(w, at, v=w.v)
+            if again.evidence.log_evidence == -math.inf:  # the fine simulation breaks down there
+                again = self._settled(w, {**at, **{p: self.scales.values[p] for p in self.bench.base}})
+            self.weighed[left[0]] = again
+
+    def _settled(self, w: Weighed, start: Mapping[str, float], **options) -> Weighed:
+        effort = {"rounds": self.effort.rounds, "iterations": self.effort.iterations}
+        return weigh(self.scales, w.evidence.keys, start, self.criteria, bench=w.bench, **effort, **options)
 
     def _tell(self, stage: str, order: Sequence[str]) -> None:
         """Report what is done now, and the best so far."""
@@ -376,25 +380,3 @@ def explore(
         e.leave_out(e.best)
         e.settle(size)
     return e
-
-
-def scaled(
-    bench: Bench,
-    cut: Blocks,
-    of: Discrepancy,
-    prediction: np.ndarray,
-    values: Mapping[str, float],
-    criteria: Criteria | None = None,
-) -> Scales:
-    """The scales of a sample about the base's fit."""
-    criteria = criteria or Criteria()
-    sigma = cut.spread(bench.sigma)
-    edges = np.flatnonzero(np.diff(cut.owner, prepend=-1))
-    rows = tuple(slice(int(a), int(b)) for a, b in zip(edges, [*edges[1:], len(sigma)], strict=True))
-    peak = max(float(np.quantile(np.abs(bench.y[s.rows]), 0.98)) for s in bench.segments) or 1.0
-    shared = None if bench.shared is None else bench.shared[cut.owner[[r.start for r in rows]]]
-    made = Scales(bench, of, (), cut, Blocked(rows, sigma, shared), values, cut.mean(prediction), peak)
-    if bench.costly:
-        made.size = np.maximum(peak, criteria.unseen / criteria.negligible * cut.mean(bench.sigma))
-    made.families = tuple(p.family for p in made.about(bench.sigma, bench))
-    return made

@@ -90,6 +90,28 @@ class Scales:
         return {a: out.get(a, self.bench.free[a].scale) for a in candidate.amplitudes}
 
 
+def scaled(
+    bench: Bench,
+    cut: Blocks,
+    of: Discrepancy,
+    prediction: np.ndarray,
+    values: Mapping[str, float],
+    criteria: Criteria | None = None,
+) -> Scales:
+    """The scales of a sample about the base's fit."""
+    criteria = criteria or Criteria()
+    sigma = cut.spread(bench.sigma)
+    edges = np.flatnonzero(np.diff(cut.owner, prepend=-1))
+    rows = tuple(slice(int(a), int(b)) for a, b in zip(edges, [*edges[1:], len(sigma)], strict=True))
+    peak = max(float(np.quantile(np.abs(bench.y[s.rows]), 0.98)) for s in bench.segments) or 1.0
+    shared = None if bench.shared is None else bench.shared[cut.owner[[r.start for r in rows]]]
+    made = Scales(bench, of, (), cut, Blocked(rows, sigma, shared), values, cut.mean(prediction), peak)
+    if bench.costly:
+        made.size = np.maximum(peak, criteria.unseen / criteria.negligible * cut.mean(bench.sigma))
+    made.families = tuple(p.family for p in made.about(bench.sigma, bench))
+    return made
+
+
 def with_priors(
     scales: Scales, keys: Sequence[str], start: Mapping[str, float], criteria: Criteria, bench: Bench | None = None
 ) -> tuple[Bench, dict[str, tuple[float, float]]]:
