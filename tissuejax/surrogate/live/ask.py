@@ -48,8 +48,18 @@ class Plain:
 
     def values(self, place) -> np.ndarray:
         """Values alone, (M,), of a table over x, y, s."""
-        i, j, rows, ((k, b, _),) = self._plan(place)
-        return np.array(b) @ (rows[0] @ self.c[i : i + 4, j : j + 4, k : k + 4].reshape(16, -1)).reshape(4, -1)
+        return self.values_at(self._plan(place))
+
+    def values_at(self, plan) -> np.ndarray:
+        """The same for a place that `_plan` has been asked for, in a table on these axes."""
+        i, j, rows, ((k, b, _),) = plan
+        return np.outer(rows[0], b).ravel() @ self.c[i : i + 4, j : j + 4, k : k + 4].reshape(64, -1)
+
+    def loaded_at(self, plan, load: np.ndarray) -> list[float]:
+        """Value and slopes by x, y, s of the sum of the M values times `load`, (M,)."""
+        i, j, rows, ((k, b, d),) = plan
+        some = rows @ (self.c[i : i + 4, j : j + 4, k : k + 4].reshape(64, -1) @ load).reshape(16, 4)
+        return [*(some @ b).tolist(), float(some[0] @ d)]
 
 
 class Asker:
@@ -77,6 +87,7 @@ class Asker:
         """Forget everything: rested, untouched tissue."""
         count = 0 if self.memory is None else self.memory[0].count
         self.gone, self.now = np.zeros((len(self.g), count)), np.zeros(count)
+        self.steps = None, None  # the last dt, and what decays in it
         self.stretch, self.stiff, self.at, self.deepest = np.zeros(2), 0.0, None, -1.0
         self.share, self.free = 1.0, [1.0, 1.0]
         self.place = [(a + b) / 2 for a, b in zip(self.low, self.high)]
@@ -123,16 +134,20 @@ class Asker:
         return [*force, up], 1.5 * up / max(s * s * D, 1e-9)
 
     def _relaxed(self, place, inside, tilt, dt):
-        b = self.factor * inside * self.memory[0].values(place)
-        x = dt / self.tau
-        decay = np.exp(-x)
-        ramp = 1 - np.where(x > 1e-4, -np.expm1(-x) / np.maximum(x, 1e-300), 1 - x / 2)
-        now = self.now
-        self.gone = decay[:, None] * self.gone + (1 - decay)[:, None] * now + ramp[:, None] * (b - now)
+        stress, strain = self.memory
+        plan = stress._plan(place)  # the two tables have the same axes
+        b = self.factor * inside * stress.values_at(plan)
+        if dt != self.steps[0]:
+            x = dt / self.tau
+            decay = np.exp(-x)
+            ramp = 1 - np.where(x > 1e-4, -np.expm1(-x) / np.maximum(x, 1e-300), 1 - x / 2)
+            self.steps = dt, np.stack([decay, 1 - decay - ramp, ramp])[..., None]
+        decay, left, ramp = self.steps[1]
+        self.gone = decay * self.gone + left * self.now + ramp * b
         self.now = b
         if self.depth <= 0:
             return [0.0, 0.0, 0.0]
-        e, ex, ey, es, *_ = (self.memory[1].deep(place) @ (self.g @ self.gone)).tolist()
+        e, ex, ey, es = strain.loaded_at(plan, self.g @ self.gone)
         deeper = e + es * place[2] / 2
         return [*(f * (inside * a + deeper * t) for f, a, t in zip(self.free, (ex, ey), tilt)), -deeper]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tissuejax.errors import InputError
 
-FLAGS = ("-std=c99", "-O3", "-march=native", "-Wall", "-Wextra")
+FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-Wall", "-Wextra")
 WORD = "no C compiler (cc, gcc or clang) is on this machine, and the haptic loop is compiled here; install one"
 
 

@@ -64,7 +64,29 @@ TJ_API void tj_box(const tj_model *model, double box[7]);
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct { double origin[3], per[3]; int n[3], m; double *c; } tj__table;
+/* Sums side by side, as many as the processor adds at once; loops do the same where vectors have no name. */
+#if defined(__AVX512F__)
+#define TJ__WIDE 8
+#else
+#define TJ__WIDE 4
+#endif
+#if defined(__GNUC__)
+typedef double tj__sums __attribute__((vector_size(8 * TJ__WIDE)));
+#define TJ__ADD(to, by, from) ((to) += (by) * (from))
+#define TJ__ADDS(to, by, from) ((to) += (by) * (from))
+#define TJ__PART(v, a) ((v)[a])
+#else
+typedef struct { double part[TJ__WIDE]; } tj__sums;
+#define TJ__ADD(to, by, from) \
+    do { int a_; for (a_ = 0; a_ < TJ__WIDE; a_++) (to).part[a_] += (by) * (from).part[a_]; } while (0)
+#define TJ__ADDS(to, by, from) \
+    do { int a_; for (a_ = 0; a_ < TJ__WIDE; a_++) (to).part[a_] += (by).part[a_] * (from).part[a_]; } while (0)
+#define TJ__PART(v, a) ((v).part[a])
+#endif
+#define TJ__NONE {0}
+
+/* `m` values at a place: one, in `c`; or many, in `wide`, `row` times TJ__WIDE of them, filled with zeros. */
+typedef struct { double origin[3], per[3]; int n[3], m, row; double *c; tj__sums *wide; void *own; } tj__table;
 struct tj_model {
     double low[2], high[2], depth, radius, factor, friction, give, strength, reach, slip[3];
     int terms;
@@ -76,22 +98,34 @@ static const char *tj__said = "";
 TJ_API const char *tj_fault(void) { return tj__said; }
 
 static int tj__read(FILE *f, void *to, size_t size) { return fread(to, 1, size, f) == size; }
-static int tj__table_in(FILE *f, tj__table *t, int axes) {
+static int tj__table_in(FILE *f, tj__table *t, int axes, int wide) {
     int32_t n[4];
     size_t i, count = 1;
+    int j;
     if (!tj__read(f, n, sizeof n)) return 0;
     for (i = 0; i < 4; i++) if (n[i] < 1 || n[i] > 100000) return 0;
     for (i = 0; i < 3; i++) { t->n[i] = n[i]; count *= (size_t)n[i]; }
     for (i = 0; i < (size_t)axes; i++) if (n[i] < 4) return 0;
     t->m = n[3];
-    if (axes == 2 && t->m != 1) return 0;
     if (t->m > TJ_MODES || count > (size_t)1 << 26) return 0;
-    count *= (size_t)t->m;
+    if (!wide && t->m != 1) return 0;
+    t->row = (t->m + TJ__WIDE - 1) / TJ__WIDE;
     if (!tj__read(f, t->origin, sizeof t->origin) || !tj__read(f, t->per, sizeof t->per)) return 0;
-    t->c = (double *)malloc(count * sizeof(double));
-    if (!t->c || !tj__read(f, t->c, count * sizeof(double))) return 0;
-    for (i = 0; i < count; i++) if (!isfinite(t->c[i])) return 0;
+    t->own = calloc(count + 8, wide ? (size_t)t->row * sizeof(tj__sums) : sizeof(double));
+    if (!t->own) return 0;
+    t->c = (double *)(((uintptr_t)t->own + 63) & ~(uintptr_t)63);
+    t->wide = (tj__sums *)t->c;
+    for (i = 0; i < count; i++) {
+        double *c = t->c + (wide ? i * (size_t)(t->row * TJ__WIDE) : i);
+        if (!tj__read(f, c, (size_t)t->m * sizeof(double))) return 0;
+        for (j = 0; j < t->m; j++) if (!isfinite(c[j])) return 0;
+    }
     return 1;
+}
+
+static int tj__alike(const tj__table *a, const tj__table *b) {
+    return a->m == b->m && !memcmp(a->n, b->n, sizeof a->n) && !memcmp(a->origin, b->origin, sizeof a->origin)
+        && !memcmp(a->per, b->per, sizeof a->per);
 }
 
 TJ_API tj_model *tj_open(const char *path) {
@@ -109,9 +143,10 @@ TJ_API tj_model *tj_open(const char *path) {
             tj__said = "cut off or damaged";
             model->terms = head[0];
             fine = tj__read(f, v, sizeof v) && tj__read(f, model->g, sizeof model->g)
-                && tj__read(f, model->tau, sizeof model->tau) && tj__table_in(f, &model->touch, 2)
-                && tj__table_in(f, &model->law, 3);
-            if (fine && model->terms) fine = tj__table_in(f, &model->stress, 3) && tj__table_in(f, &model->strain, 3);
+                && tj__read(f, model->tau, sizeof model->tau) && tj__table_in(f, &model->touch, 2, 0)
+                && tj__table_in(f, &model->law, 3, 0);
+            if (fine && model->terms) fine = tj__table_in(f, &model->stress, 3, 1)
+                && tj__table_in(f, &model->strain, 3, 1) && tj__alike(&model->stress, &model->strain);
         }
     }
     if (f) fclose(f);
@@ -126,7 +161,7 @@ TJ_API tj_model *tj_open(const char *path) {
 
 TJ_API void tj_close(tj_model *model) {
     if (!model) return;
-    free(model->touch.c); free(model->law.c); free(model->stress.c); free(model->strain.c); free(model);
+    free(model->touch.own); free(model->law.own); free(model->stress.own); free(model->strain.own); free(model);
 }
 
 TJ_API void tj_rest(const tj_model *model, tj_state *state) {
@@ -139,71 +174,87 @@ TJ_API void tj_rest(const tj_model *model, tj_state *state) {
 
 static void tj__basis(double u, double per, double b[4], double d[4]) {
     double v = 1 - u;
-    b[0] = v * v * v / 6; b[1] = ((3 * u - 6) * u * u + 4) / 6; b[2] = ((3 * v - 6) * v * v + 4) / 6; b[3] = u * u * u / 6;
-    d[0] = -v * v / 2 * per; d[1] = (3 * u - 4) * u / 2 * per; d[2] = -(3 * v - 4) * v / 2 * per; d[3] = u * u / 2 * per;
+    b[0] = v * v * v / 6; b[1] = ((3 * u - 6) * u * u + 4) / 6;
+    b[2] = ((3 * v - 6) * v * v + 4) / 6; b[3] = u * u * u / 6;
+    d[0] = -v * v / 2 * per; d[1] = (3 * u - 4) * u / 2 * per;
+    d[2] = -(3 * v - 4) * v / 2 * per; d[3] = u * u / 2 * per;
 }
 
-/* Rows of values: value, d/dx, d/dy, d/ds, d2/dxds, d2/dyds, as many as asked for. */
-static void tj__ask(const tj__table *t, int axes, int rows, const double at[3], double out[6][TJ_MODES]) {
-    double b[3][4], d[3][4];
-    int first[3] = {0, 0, 0}, i, j, l, m, a, M = t->m, deep = axes == 3 ? 4 : 1;
+typedef struct { double b[3][4], d[3][4]; size_t first, x, y; } tj__spot;
+
+/* Where a place lies in a table: basis, slopes, number of the first node and the strides from there. */
+static void tj__find(const tj__table *t, int axes, const double at[3], tj__spot *q) {
+    int first[3] = {0, 0, 0}, a;
     for (a = 0; a < axes; a++) {
         double x = (at[a] - t->origin[a]) * t->per[a];
         int k = (int)floor(x);
-        k = k < 0 ? 0 : k > t->n[a] - 4 ? t->n[a] - 4 : k;
-        first[a] = k;
-        tj__basis(x - k, t->per[a], b[a], d[a]);
+        first[a] = k = k < 0 ? 0 : k > t->n[a] - 4 ? t->n[a] - 4 : k;
+        tj__basis(x - k, t->per[a], q->b[a], q->d[a]);
     }
-    if (axes == 2) { b[2][0] = 1; d[2][0] = 0; }
-    if (M == 1) {
-        double r[6] = {0, 0, 0, 0, 0, 0};
-        for (i = 0; i < 4; i++)
-            for (j = 0; j < 4; j++) {
-                double p = 0, q = 0, v = b[0][i] * b[1][j], vx = d[0][i] * b[1][j], vy = b[0][i] * d[1][j];
-                const double *c = t->c + ((size_t)(first[0] + i) * t->n[1] + first[1] + j) * t->n[2] + first[2];
-                for (l = 0; l < deep; l++) { p += b[2][l] * c[l]; q += d[2][l] * c[l]; }
-                r[0] += v * p; r[1] += vx * p; r[2] += vy * p; r[3] += v * q; r[4] += vx * q; r[5] += vy * q;
-            }
-        for (i = 0; i < rows; i++) out[i][0] = r[i];
-        return;
-    }
-    memset(out[0], 0, (size_t)M * sizeof(double)); /* of many values only the values are asked here, see tj__loaded */
+    q->y = (size_t)t->n[2];
+    q->x = q->y * (size_t)t->n[1];
+    q->first = q->x * (size_t)first[0] + q->y * (size_t)first[1] + (size_t)first[2];
+}
+
+/* Value, d/dx, d/dy, d/ds, d2/dxds, d2/dyds of a table of one value. */
+static void tj__one(const tj__table *t, int axes, const double at[3], double r[6]) {
+    tj__spot q;
+    int i, j, l;
+    tj__find(t, axes, at, &q);
+    for (i = 0; i < 6; i++) r[i] = 0;
     for (i = 0; i < 4; i++)
         for (j = 0; j < 4; j++) {
-            double v = b[0][i] * b[1][j];
-            const double *c = t->c + (((size_t)(first[0] + i) * t->n[1] + first[1] + j) * t->n[2] + first[2]) * M;
-            for (l = 0; l < deep; l++, c += M) {
-                double p = v * b[2][l];
-                for (m = 0; m < M; m++) out[0][m] += p * c[m];
-            }
+            double p = 0, s = 0, v = q.b[0][i] * q.b[1][j], vx = q.d[0][i] * q.b[1][j], vy = q.b[0][i] * q.d[1][j];
+            const double *c = t->c + q.first + q.x * (size_t)i + q.y * (size_t)j;
+            if (axes == 2) p = c[0];
+            else for (l = 0; l < 4; l++) { p += q.b[2][l] * c[l]; s += q.d[2][l] * c[l]; }
+            r[0] += v * p; r[1] += vx * p; r[2] += vy * p; r[3] += v * s; r[4] += vx * s; r[5] += vy * s;
         }
 }
 
-/* Value and slopes by x, y, s of a table over x, y, s whose M values are taken together with these weights first. */
-static void tj__loaded(const tj__table *t, const double at[3], const double load[TJ_MODES], double out[4]) {
-    double b[3][4], d[3][4];
-    int first[3], i, j, l, m, a, M = t->m;
-    for (a = 0; a < 3; a++) {
-        double x = (at[a] - t->origin[a]) * t->per[a];
-        int k = (int)floor(x);
-        first[a] = k = k < 0 ? 0 : k > t->n[a] - 4 ? t->n[a] - 4 : k;
-        tj__basis(x - k, t->per[a], b[a], d[a]);
-    }
-    out[0] = out[1] = out[2] = out[3] = 0;
+/* The values alone of a table of many over x, y, s. */
+static void tj__many(const tj__table *t, const tj__spot *q, tj__sums *out) {
+    int i, j, l, m, M = t->row;
+    double v[16][4];
+    const tj__sums *row[16];
     for (i = 0; i < 4; i++)
         for (j = 0; j < 4; j++) {
-            const double *c = t->c + (((size_t)(first[0] + i) * t->n[1] + first[1] + j) * t->n[2] + first[2]) * M;
-            double p = 0, q = 0;
-            for (l = 0; l < 4; l++, c += M) {
-                double w[4] = {0, 0, 0, 0}, sum; /* four sums side by side: the processor adds them at once */
-                for (m = 0; m + 4 <= M; m += 4)
-                    for (a = 0; a < 4; a++) w[a] += load[m + a] * c[m + a];
-                for (sum = w[0] + w[1] + w[2] + w[3]; m < M; m++) sum += load[m] * c[m];
-                p += b[2][l] * sum; q += d[2][l] * sum;
-            }
-            out[0] += b[0][i] * b[1][j] * p; out[1] += d[0][i] * b[1][j] * p; out[2] += b[0][i] * d[1][j] * p;
-            out[3] += b[0][i] * b[1][j] * q;
+            row[4 * i + j] = t->wide + (q->first + q->x * (size_t)i + q->y * (size_t)j) * (size_t)M;
+            for (l = 0; l < 4; l++) v[4 * i + j][l] = q->b[0][i] * q->b[1][j] * q->b[2][l];
         }
+    for (m = 0; m < M; m++) {
+        tj__sums w0 = TJ__NONE, w1 = TJ__NONE, w2 = TJ__NONE, w3 = TJ__NONE; /* four that don't wait for each other */
+        for (i = 0; i < 16; i++) {
+            const tj__sums *c = row[i] + m;
+            TJ__ADD(w0, v[i][0], c[0]); TJ__ADD(w1, v[i][1], c[M]);
+            TJ__ADD(w2, v[i][2], c[2 * M]); TJ__ADD(w3, v[i][3], c[3 * M]);
+        }
+        TJ__ADD(w0, 1, w1); TJ__ADD(w2, 1, w3); TJ__ADD(w0, 1, w2);
+        out[m] = w0;
+    }
+}
+
+/* Value and slopes by x, y, s of a table over x, y, s whose M values are taken together with these weights first. */
+static void tj__loaded(const tj__table *t, const tj__spot *q, const tj__sums *load, double out[4]) {
+    tj__sums r0 = TJ__NONE, r1 = TJ__NONE, r2 = TJ__NONE, r3 = TJ__NONE;
+    const double *b = q->b[2], *d = q->d[2];
+    int i, j, a, m, M = t->row;
+    for (i = 0; i < 4; i++)
+        for (j = 0; j < 4; j++) {
+            tj__sums w0 = TJ__NONE, w1 = TJ__NONE, w2 = TJ__NONE, w3 = TJ__NONE, p = TJ__NONE, s = TJ__NONE;
+            const tj__sums *c = t->wide + (q->first + q->x * (size_t)i + q->y * (size_t)j) * (size_t)M;
+            for (m = 0; m < M; m++, c++) {
+                TJ__ADDS(w0, load[m], c[0]); TJ__ADDS(w1, load[m], c[M]);
+                TJ__ADDS(w2, load[m], c[2 * M]); TJ__ADDS(w3, load[m], c[3 * M]);
+            }
+            TJ__ADD(p, b[0], w0); TJ__ADD(p, b[1], w1); TJ__ADD(p, b[2], w2); TJ__ADD(p, b[3], w3);
+            TJ__ADD(s, d[0], w0); TJ__ADD(s, d[1], w1); TJ__ADD(s, d[2], w2); TJ__ADD(s, d[3], w3);
+            TJ__ADD(r0, q->b[0][i] * q->b[1][j], p); TJ__ADD(r1, q->d[0][i] * q->b[1][j], p);
+            TJ__ADD(r2, q->b[0][i] * q->d[1][j], p); TJ__ADD(r3, q->b[0][i] * q->b[1][j], s);
+        }
+    for (out[0] = out[1] = out[2] = out[3] = 0, a = 0; a < TJ__WIDE; a++) {
+        out[0] += TJ__PART(r0, a); out[1] += TJ__PART(r1, a); out[2] += TJ__PART(r2, a); out[3] += TJ__PART(r3, a);
+    }
 }
 
 static double tj__clip(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
@@ -242,7 +293,7 @@ static void tj__rub(const tj_model *m, tj_state *s, const double p[3], double de
 }
 
 TJ_API void tj_force(const tj_model *m, tj_state *state, const double p[3], double dt, double f[3]) {
-    double at[3], t[6][TJ_MODES], z[3], beyond[2], r, fade = 1, depth, inside, below, s, stiff = 0, D = m->depth;
+    double at[3], t[6], z[6], beyond[2], r, fade = 1, depth, inside, below, s, stiff = 0, D = m->depth;
     double free_[2];
     int a, k, i;
     f[0] = f[1] = f[2] = 0;
@@ -253,8 +304,7 @@ TJ_API void tj_force(const tj_model *m, tj_state *state, const double p[3], doub
         beyond[a] = p[a] - at[a];
         free_[a] = beyond[a] == 0 ? 1 : 0;
     }
-    tj__ask(&m->touch, 2, 3, at, t);
-    for (a = 0; a < 3; a++) z[a] = t[a][0];
+    tj__one(&m->touch, 2, at, z);
     state->depth = depth = z[0] - p[2];
     inside = tj__clip(depth, 0, D); below = depth > D ? depth - D : 0;
     at[2] = s = sqrt(inside / D);
@@ -266,30 +316,34 @@ TJ_API void tj_force(const tj_model *m, tj_state *state, const double p[3], doub
     if (state->share < fade) fade = state->share;
     if (depth > 0) {
         double d15 = D * sqrt(D), s5 = s * s * s * s * s, up;
-        tj__ask(&m->law, 3, 6, at, t);
-        up = m->factor * d15 * s * s * s * (5 * t[0][0] + s * t[3][0]) / 2;
+        tj__one(&m->law, 3, at, t);
+        up = m->factor * d15 * s * s * s * (5 * t[0] + s * t[3]) / 2;
         for (a = 0; a < 2; a++) {
-            double aside = m->factor * (d15 * D * s5 * t[1 + a][0] + below * d15 * (5 * t[1 + a][0] + t[4 + a][0]) / 2);
+            double aside = m->factor * (d15 * D * s5 * t[1 + a] + below * d15 * (5 * t[1 + a] + t[4 + a]) / 2);
             f[a] = -free_[a] * (aside + up * z[1 + a]);
         }
         f[2] = up;
         stiff = 1.5 * up / (inside > 1e-9 ? inside : 1e-9);
     }
     if (m->terms) {
-        double load[TJ_MODES] = {0};
-        int M = m->stress.m;
-        tj__ask(&m->stress, 3, 1, at, t);
+        union { double one[TJ_MODES]; tj__sums many[TJ_MODES / TJ__WIDE]; } load, b;
+        tj__spot where; /* the same in both tables */
+        int M = m->stress.row * TJ__WIDE;
+        tj__find(&m->stress, 3, at, &where);
+        tj__many(&m->stress, &where, b.many);
+        for (i = 0; i < M; i++) { b.one[i] *= m->factor * inside; load.one[i] = 0; }
         for (k = 0; k < m->terms; k++) {
-            double h = dt / m->tau[k], decay = exp(-h), ramp = 1 - (h > 1e-4 ? -expm1(-h) / h : 1 - h / 2), *q = state->gone[k];
+            double h = dt / m->tau[k], gone = -expm1(-h), ramp = 1 - (h > 1e-4 ? gone / h : 1 - h / 2);
+            double left = gone - ramp, keep = 1 - gone, g = m->g[k], *q = state->gone[k];
             for (i = 0; i < M; i++) {
-                q[i] = decay * q[i] + (1 - decay) * state->now[i] + ramp * (m->factor * inside * t[0][i] - state->now[i]);
-                load[i] += m->g[k] * q[i];
+                q[i] = keep * q[i] + left * state->now[i] + ramp * b.one[i];
+                load.one[i] += g * q[i];
             }
         }
-        for (i = 0; i < M; i++) state->now[i] = m->factor * inside * t[0][i];
+        memcpy(state->now, b.one, (size_t)M * sizeof(double));
         if (depth > 0) {
             double e[4], deeper;
-            tj__loaded(&m->strain, at, load, e);
+            tj__loaded(&m->strain, &where, load.many, e);
             deeper = e[0] + e[3] * s / 2;
             f[0] += free_[0] * (inside * e[1] + deeper * z[1]);
             f[1] += free_[1] * (inside * e[2] + deeper * z[2]);
@@ -302,11 +356,11 @@ TJ_API void tj_force(const tj_model *m, tj_state *state, const double p[3], doub
 }
 
 TJ_API void tj_box(const tj_model *m, double box[7]) {
-    double at[3], t[6][TJ_MODES];
+    double at[3], t[6];
     int a;
     for (a = 0; a < 2; a++) { box[a] = m->low[a]; box[2 + a] = m->high[a]; at[a] = (m->low[a] + m->high[a]) / 2; }
-    tj__ask(&m->touch, 2, 3, at, t);
-    box[4] = m->depth; box[5] = m->radius; box[6] = t[0][0];
+    tj__one(&m->touch, 2, at, t);
+    box[4] = m->depth; box[5] = m->radius; box[6] = t[0];
 }
 
 TJ_API void tj_guard_start(tj_guard *g, double most, double slew, double ramp) {
