@@ -1,5 +1,7 @@
 """The element loop in C computes what JAX computes of the same lane, and so do its derivatives, whatever is in it."""
 
+import dataclasses
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -8,9 +10,11 @@ import pytest
 
 from tests.tled import cases
 from tissuejax.mesh.columns import box
-from tissuejax.tled import internal, native
+from tissuejax.mesh.facets import boundary
+from tissuejax.tled import build, contact, internal, native
 from tissuejax.tled.history import Damage, Prony
 from tissuejax.tled.lanes import library, loop
+from tissuejax.tled.shapes import Punch, Sphere
 
 pytestmark = pytest.mark.skipif(library.compiler() is None, reason="no C compiler here")
 
@@ -70,6 +74,43 @@ def test_what_c_computes_is_what_xla_computes(set_up, derived):
     for a, b in zip(jax.tree.leaves(ours), jax.tree.leaves(known), strict=True):
         assert np.abs(b).max() > 0
         assert np.allclose(a, b, rtol=0, atol=1e-12 * np.abs(b).max())
+
+
+@pytest.mark.parametrize("form", [Sphere(4e-3), Punch(3e-3, 1e-3)], ids=["ball", "flat punch"])
+@pytest.mark.parametrize("rough", [False, True], ids=["bare", "friction and adhesion"])
+def test_contact_in_c_is_contact_by_xla(monkeypatch, form, rough):
+    """Forces, torque, what rubbing lost and the memory after two places of the probe, their tangents and gradients."""
+    made = cases.plain(box((0.02, 0.02, 0.01), (4, 4, 2)), np.arange(2.0), order=1)
+    points = np.asarray(made.body.points)
+    facets = boundary(np.asarray(made.body.cells), "hexahedron").nodes
+    facets = facets[(points[facets][..., 2] > 0.0099).all(1)]
+    path = np.array([[0, 0, 0.02], [0, 0, 0.02]])
+    probe = build.probe(made, form, [0.0, 1.0], path, facets, penalty=2e6, softness=1e-4)
+    if rough:
+        more = dict(friction=jnp.array(0.3), adhesion=jnp.array(500.0), give=jnp.array(1e-8), reach=jnp.array(2e-4))
+        probe = dataclasses.replace(probe, **more)
+    probe = jax.tree.map(lambda x: jnp.asarray(x) if np.asarray(x).dtype.kind == "i" else jnp.asarray(x, float), probe)
+    patch = contact.patch(eqx.tree_at(lambda s: s.probe, made, probe, is_leaf=lambda x: x is None))
+    u = jnp.asarray(2e-4 * np.random.default_rng(3).normal(size=(3, len(points))))
+    low = 0.0135 if isinstance(form, Sphere) else 0.0125
+
+    def twice(u, penalty, x):
+        here = dataclasses.replace(probe, penalty=penalty)
+        first = contact.forces(here, patch, u, jnp.array([0.0, 0, low]), contact.untouched(probe))
+        then = contact.forces(here, patch, u, jnp.stack([x, 0.0 * x, low - 1e-4 + 0.0 * x]), first.grip)
+        return [leaf for leaf in jax.tree.leaves(then) if leaf is not None]
+
+    def found(by_c):
+        monkeypatch.setattr(native, "wanted", lambda: by_c)
+        at, along = (u, probe.penalty, jnp.array(5e-4)), (jnp.ones_like(u), jnp.array(1e5), jnp.array(1.0))
+        pulled = jax.grad(lambda *a: sum(jnp.sum(x**2) for x in twice(*a)), (0, 1, 2))
+        return jax.jit(lambda *a: (jax.jvp(twice, a, along), pulled(*a)))(*at)
+
+    ours, known = found(True), found(False)
+    assert native.contact(contact.by_facet, probe, patch, contact.untouched(probe)) is None  # as just set
+    for a, b in zip(jax.tree.leaves(ours), jax.tree.leaves(known), strict=True):
+        assert np.allclose(a, b, rtol=0, atol=1e-11 * max(np.abs(b).max(), 1e-6))  # a ball has no torque
+    assert np.abs(known[0][0][0]).max() > 1e-3
 
 
 def test_operations_without_a_form_in_c_are_left_to_jax():

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from tissuejax.tled import native
 from tissuejax.tled.internal import add, barrier, take
 from tissuejax.tled.scene import Probe, Scene
 
@@ -77,8 +78,13 @@ class Touch(NamedTuple):
 def places(patch: Patch, u: Float[Array, "3 N"], centre: Float[Array, " 3"], shape: np.ndarray):
     """Contact points relative to the probe's reference point, three arrays (q, P); one component at a time, see
     `internal.take`."""
-    weights = jnp.asarray(shape, u.dtype)[:, :, None]
-    corners = barrier(tuple(x + take(row, patch.nodes) for x, row in zip(patch.x, u, strict=True)))
+    return _placed(patch.x, [take(row, patch.nodes) for row in u], centre, shape)
+
+
+def _placed(x, ue, centre, shape):
+    """`places` of corners at rest `x` and their displacements `ue`, each (3, v, P)."""
+    weights = jnp.asarray(shape, ue[0].dtype)[:, :, None]
+    corners = barrier(tuple(a + b for a, b in zip(x, ue, strict=True)))
     return barrier(
         tuple(sum(weights[:, a] * x[a] for a in range(len(x))) - c for x, c in zip(corners, centre, strict=True))
     )
@@ -93,10 +99,34 @@ def _softplus(z):
     return jnp.maximum(z, 0.0) + jnp.log1p(jnp.exp(-jnp.abs(z)))
 
 
+class Pressed(NamedTuple):
+    """What each facet does: forces at its points and its corners, N, where the points are from the probe, m, the
+    memory, and what friction lost by sliding, J (None without friction)."""
+
+    f: tuple[Float[Array, "q P"], ...]
+    at_nodes: tuple[Float[Array, "v P"], ...]
+    x: tuple[Float[Array, "q P"], ...]
+    grip: Grip
+    lost: Float[Array, "q P"] | None
+
+
 def forces(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Array, " 3"], grip: Grip) -> Touch:
     """Contact forces with the probe's reference point at `centre`."""
-    shape, _ = quadrature(patch.nodes.shape[0])
-    x = places(patch, u, centre, shape)
+    touch = native.contact(by_facet, probe, patch, grip)
+    if touch is not None:
+        nodal, force, torque, rubbed, grip = touch(u, centre)
+        return Touch(nodal, -force, -torque, grip, rubbed)
+    f, at_nodes, x, grip, lost = by_facet(probe, patch.x, [take(row, patch.nodes) for row in u], centre, grip)
+    force = jnp.stack([total(t) for t in f])
+    torque = jnp.stack([total(x[i - 2] * f[i - 1] - x[i - 1] * f[i - 2]) for i in range(3)])
+    nodal = jnp.stack(barrier(tuple(add(t, patch.nodes, u.shape[1]) for t in at_nodes)))
+    return Touch(nodal, -force, -torque, grip, None if lost is None else total(lost))
+
+
+def by_facet(probe: Probe, x, ue, centre: Float[Array, " 3"], grip: Grip) -> Pressed:
+    """Facet by facet, from the places of the corners at rest `x` and their displacements `ue`, each (3, v, P)."""
+    shape, _ = quadrature(len(x[0]))
+    x = _placed(x, ue, centre, shape)
     gap, normal = probe.shape.distance(x)
     pressure = barrier(probe.penalty * probe.softness * _softplus(-gap / probe.softness))  # once, not once a component
     push, bond = pressure, grip.bond
@@ -106,18 +136,15 @@ def forces(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Arr
         opening = jnp.maximum(gap, 0.0) / probe.reach
         push = pressure - probe.adhesion * bond * opening * jnp.exp(1.0 - opening)
     traction, anchor = tuple(push * n for n in normal), grip.anchor  # on the tissue: away from the probe
-    rubbed = None
+    lost = None
     if probe.friction is not None:
         drag, anchor, lost = _friction(probe, x, normal, pressure, anchor)
-        rubbed = total(lost * probe.area)
+        lost = lost * probe.area
         traction = tuple(t + d for t, d in zip(traction, drag, strict=True))
     f = barrier(tuple(t * probe.area for t in traction))
-    force = jnp.stack([total(t) for t in f])
-    torque = jnp.stack([total(x[i - 2] * f[i - 1] - x[i - 1] * f[i - 2]) for i in range(3)])
-    weights = jnp.asarray(shape, u.dtype)[:, :, None]
+    weights = jnp.asarray(shape, gap.dtype)[:, :, None]
     at_nodes = barrier(tuple(sum(weights[q] * t[q] for q in range(shape.shape[0])) for t in f))
-    nodal = jnp.stack(barrier(tuple(add(t, patch.nodes, u.shape[1]) for t in at_nodes)))
-    return Touch(nodal, -force, -torque, Grip(anchor, bond), rubbed)
+    return Pressed(f, at_nodes, x, Grip(anchor, bond), lost)
 
 
 def _friction(probe, x, normal, pressure, anchor):

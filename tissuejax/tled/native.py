@@ -1,4 +1,5 @@
-"""The element loop of a scene as compiled C (`lanes/`), where a C compiler is; elsewhere what XLA makes of it stands.
+"""The element loop of a scene, and its contact, as compiled C (`lanes/`), where a C compiler is; elsewhere what XLA
+makes of them stands.
 
 It is off unless TISSUEJAX_NATIVE=on, and on in `play --direct`, where each call counts. XLA copies between its stages,
 and each of some 55 operations a block costs a call: the step takes 3.2 to 3.7 times what a hand-written one does
@@ -25,10 +26,11 @@ from tissuejax.tled.lanes.walk import Untold
 from tissuejax.tled.lanes.write import WIDTH, Slot
 
 if TYPE_CHECKING:
-    from tissuejax.tled.scene import Scene
+    from tissuejax.tled.scene import Probe, Scene
 
 _kernels: dict[Any, Kernel | None] = {}
 MOST = 200  # kernels that are remembered
+FACETS = 16  # that contact takes at once: `build.PATCH`, of which all patches are multiples
 
 
 def wanted() -> bool:
@@ -66,11 +68,7 @@ def loop(by_element: Callable, scene: "Scene", mesh: Any, history: Any) -> Calla
         return None
     slots = [_slot(x, count) for x in leaves]
     key = (structure, tuple(slots), dtype, scene.body.element)
-    if key not in _kernels:
-        if len(_kernels) >= MOST:
-            _kernels.clear()
-        _kernels[key] = _kernel(by_element, scene, mesh, structure, slots, dtype)
-    kernel = _kernels[key]
+    kernel = _remembered(key, lambda: _kernel(by_element, scene, mesh, structure, slots, dtype))
     if kernel is None:
         return None
 
@@ -79,6 +77,14 @@ def loop(by_element: Callable, scene: "Scene", mesh: Any, history: Any) -> Calla
         return out[0], jax.tree.unflatten(jax.tree.structure(history), out[1:])
 
     return forces
+
+
+def _remembered(key: Any, make: Callable[[], Kernel | None]) -> Kernel | None:
+    if key not in _kernels:
+        if len(_kernels) >= MOST:
+            _kernels.clear()
+        _kernels[key] = make()
+    return _kernels[key]
 
 
 def _slot(x: Array, count: int) -> Slot:
@@ -97,18 +103,74 @@ def _kernel(by_element, scene, mesh, structure, slots, dtype) -> Kernel | None:
         return [jnp.stack(f), *jax.tree.leaves(history)]
 
     ins = [Slot("nodal", (3,)), Slot("uniform", ()), *slots]
-    outs = ["nodal"] + ["lane"] * (len(jax.eval_shape(one, *_shapes(ins, mesh, dtype))) - 1)
+    outs = ["nodal"] + ["lane"] * (len(jax.eval_shape(one, *_shapes(ins, mesh.cells.shape[0], dtype))) - 1)
+    return _tried(one, mesh.cells.shape[0], ins, outs, dtype)
+
+
+def _tried(one: Callable, corners: int, ins: list[Slot], outs: list[str], dtype, width: int = WIDTH) -> Kernel | None:
     try:
-        kernel = trace(one, mesh.cells.shape[0], ins, outs, dtype)
+        kernel = trace(one, corners, ins, outs, dtype, width)
         kernel.name(str(dtype), (False,) * len(ins))
     except Untold:
         return None
     except NotCompiled as refused:
-        warnings.warn(f"the C compiler refused the element loop, XLA's is taken: {refused}", stacklevel=2)
+        warnings.warn(f"the C compiler refused a loop, XLA's is taken: {refused}", stacklevel=2)
         return None
     return kernel
 
 
-def _shapes(ins, mesh, dtype):
-    last = {"nodal": (mesh.cells.shape[0], 1), "lane": (1,), "uniform": ()}
+def contact(by_facet: Callable, probe: "Probe", patch: Any, grip: Any) -> Callable | None:
+    """Contact at a place of the probe: of `u` (3, N), m, and the place (3,), m, the nodal forces (3, N), N, force (3,),
+    N, and torque (3,), N m, on the tissue, what rubbing lost, J (or None), and the new memory. None: XLA is to do it.
+
+    Args:
+        by_facet: `contact.by_facet`, of arrays whose last axis counts facets.
+    """
+    dtype, count = probe.area.dtype, probe.area.shape[-1]
+    if not wanted() or count % FACETS or dtype not in (jnp.float32, jnp.float64):
+        return None
+    bare = dataclasses.replace(probe, time=None, position=None, patch=None, area=None, mass=None)
+    bare = dataclasses.replace(bare, offset=None, compliance=None)
+    tree = (bare, probe.area, patch.x, grip)
+    leaves, structure = jax.tree.flatten(tree)
+    leaves = [jnp.asarray(x) for x in leaves]
+    if any(x.dtype != dtype for x in leaves):
+        return None
+    same = len(jax.tree.leaves(bare))  # for all facets
+    slots = [Slot("uniform", x.shape) if i < same else Slot("lane", x.shape[:-1]) for i, x in enumerate(leaves)]
+    key = ("contact", structure, tuple(slots), dtype)
+    kernel = _remembered(key, lambda: _contact(by_facet, structure, slots, len(patch.nodes), dtype))
+    if kernel is None:
+        return None
+    sums = 2 + (probe.friction is not None)
+
+    def touch(u: Float[Array, "3 N"], centre: Float[Array, " 3"]):
+        out = run(kernel, patch.nodes, [u, jnp.asarray(centre, dtype), *leaves], u.shape[-1])
+        after = jax.tree.unflatten(jax.tree.structure(grip), out[1 + sums :])
+        return out[0], out[1], out[2], out[3] if sums > 2 else None, after
+
+    return touch
+
+
+def _contact(by_facet, structure, slots, corners: int, dtype) -> Kernel | None:
+    """The kernel, tried out once; None where the probe's form has an operation without a form in C."""
+
+    def one(u, centre, *leaves):
+        probe, area, x, grip = jax.tree.unflatten(structure, leaves)
+        done = by_facet(dataclasses.replace(probe, area=area), x, u, centre, grip)
+        f, x = done.f, done.x
+        torque = [x[i - 2] * f[i - 1] - x[i - 1] * f[i - 2] for i in range(3)]
+        sums = [jnp.stack([jnp.sum(t) for t in some]) for some in (f, torque)]
+        sums += [] if done.lost is None else [jnp.sum(done.lost)]
+        return [jnp.stack(done.at_nodes), *sums, *jax.tree.leaves(done.grip)]
+
+    ins = [Slot("nodal", (3,)), Slot("uniform", (3,)), *slots]
+    found = jax.eval_shape(one, *_shapes(ins, corners, dtype))
+    memory = len(jax.tree.leaves(jax.tree.unflatten(structure, [0] * len(slots))[3]))
+    outs = ["nodal"] + ["uniform"] * (len(found) - 1 - memory) + ["lane"] * memory
+    return _tried(one, corners, ins, outs, dtype, FACETS)
+
+
+def _shapes(ins, corners: int, dtype):
+    last = {"nodal": (corners, 1), "lane": (1,), "uniform": ()}
     return [jax.ShapeDtypeStruct((*s.shape, *last[s.kind]), dtype) for s in ins]

@@ -31,10 +31,13 @@ class Kernel:
         closed: traced function of arrays (c, k, 1) "nodal", (..., 1) "lane", (...) "uniform".
         corners: nodes of an element.
         ins, outs: what the arguments after the cells, and the results, are; never batched here.
+        width: elements of a block; their number must be a multiple of it.
     """
 
-    def __init__(self, closed: core.ClosedJaxpr, corners: int, ins: Sequence[Slot], outs: Sequence[Slot]):
-        self.closed, self.corners, self.ins, self.outs = closed, corners, tuple(ins), tuple(outs)
+    def __init__(
+        self, closed: core.ClosedJaxpr, corners: int, ins: Sequence[Slot], outs: Sequence[Slot], width: int = WIDTH
+    ):
+        self.closed, self.corners, self.ins, self.outs, self.width = closed, corners, tuple(ins), tuple(outs), width
         self._names: dict[tuple, str] = {}
         self._tangents: dict[tuple, Kernel] = {}
         self._transposes: dict[tuple, Kernel] = {}
@@ -59,7 +62,7 @@ class Kernel:
                 inputs.append(x.reshape(var.aval.shape))
             found = walk(self.closed.jaxpr, self.closed.consts, inputs, tape)
             outs = [Slot(s.kind, s.shape, any(batched)) for s in self.outs]
-            text = written(precision, self.corners, ins, nodes, outs, [list(x.ravel()) for x in found])
+            text = written(precision, self.corners, ins, nodes, outs, [list(x.ravel()) for x in found], self.width)
             self._names[key] = named(text)
         return self._names[key]
 
@@ -79,7 +82,8 @@ class Kernel:
                 return jax.jvp(of, tuple(a for a, m in zip(x, moving, strict=True) if m), tuple(dx))[1]
 
             ins = [*self.ins, *(s for s, m in zip(self.ins, moving, strict=True) if m)]
-            self._tangents[moving] = Kernel(jax.make_jaxpr(along)(*avals, *extra), self.corners, ins, self.outs)
+            closed = jax.make_jaxpr(along)(*avals, *extra)
+            self._tangents[moving] = Kernel(closed, self.corners, ins, self.outs, self.width)
         return self._tangents[moving]
 
     def transposed(self, linear: tuple[bool, ...], given: tuple[bool, ...]) -> "Kernel":
@@ -104,17 +108,21 @@ class Kernel:
             ins = [s for s, ln in zip(self.ins, linear, strict=True) if not ln]
             ins += [s for s, g in zip(self.outs, given, strict=True) if g]
             outs = [s for s, ln in zip(self.ins, linear, strict=True) if ln]
-            self._transposes[key] = Kernel(jax.make_jaxpr(back)(*known, *cts), self.corners, ins, outs)
+            closed = jax.make_jaxpr(back)(*known, *cts)
+            self._transposes[key] = Kernel(closed, self.corners, ins, outs, self.width)
         return self._transposes[key]
 
 
-def trace(function: Callable, corners: int, ins: Sequence[Slot], outs: Sequence[str], dtype) -> Kernel:
-    """The kernel of a function of one lane's arrays; `outs`: "nodal" or "lane" for each of the arrays it returns."""
+def trace(
+    function: Callable, corners: int, ins: Sequence[Slot], outs: Sequence[str], dtype, width: int = WIDTH
+) -> Kernel:
+    """The kernel of a function of one lane's arrays; `outs`: "nodal", "lane" or "uniform" (a sum over the lanes, given
+    without their axis) for each of the arrays it returns."""
     shapes = {"nodal": lambda s: (*s.shape, corners, 1), "lane": lambda s: (*s.shape, 1), "uniform": lambda s: s.shape}
     closed = jax.make_jaxpr(function)(*(jax.ShapeDtypeStruct(shapes[s.kind](s), dtype) for s in ins))
-    found = [Slot(kind, a.shape[:-2] if kind == "nodal" else a.shape[:-1])
-             for kind, a in zip(outs, closed.out_avals, strict=True)]  # fmt: skip
-    return Kernel(closed, corners, ins, found)
+    last = {"nodal": 2, "lane": 1, "uniform": 0}
+    found = [Slot(k, a.shape[: a.ndim - last[k]]) for k, a in zip(outs, closed.out_avals, strict=True)]
+    return Kernel(closed, corners, ins, found, width)
 
 
 def run(kernel: Kernel, cells: Any, arguments: Sequence[Any], count: int) -> list[Any]:
@@ -139,8 +147,8 @@ def _avals(kernel: Kernel, batched, count: int, cells, arguments):
 
 
 def _call(cells, *arguments, kernel: Kernel, batched, count: int):
-    if cells.shape[-1] % WIDTH:
-        raise ValueError(f"{cells.shape[-1]} elements: the loop takes multiples of {WIDTH}")
+    if cells.shape[-1] % kernel.width:
+        raise ValueError(f"{cells.shape[-1]} elements: the loop takes multiples of {kernel.width}")
     try:
         name = kernel.name(str(arguments[0].dtype), batched)
     except (Untold, NotCompiled):  # a derivative may have operations that the function has not

@@ -63,7 +63,7 @@ def _done(eqn, x: list[Objects], tape: Tape) -> list[Objects]:
         ends = np.cumsum(p["sizes"])[:-1]
         return np.split(x[0], ends, p["axis"])
     if name == "unstack":
-        return [np.take(x[0], i, p["axis"]) for i in range(x[0].shape[p["axis"]])]
+        return [np.take(x[0], [i], p["axis"]).squeeze(p["axis"]) for i in range(x[0].shape[p["axis"]])]
     if name in MOVES:
         return [MOVES[name](p, *x)]
     if name in ("gather", "dynamic_slice", "scatter-add", "scatter", "iota", "dynamic_update_slice"):

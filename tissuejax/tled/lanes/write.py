@@ -1,9 +1,9 @@
 """C of a loop over elements from the tape of one lane: gather at the nodes, arithmetic in vectors, add up at the nodes.
 
-Elements are taken in blocks of `WIDTH`, so that what passes from stage to stage stays in the first cache. What does not
-depend on the batch (the tangents of a Jacobian, say) is worked out once for all of it. The C is plain: vectors come
-from the compiler's `omp simd`. It may neither reorder nor fuse a product into a sum: then what adds zero changes no bit
-of the rest, whatever stands around it, and an effect at its neutral value is neutral.
+Elements are taken in blocks (of `WIDTH` where nothing else is said), so that what passes from stage to stage stays in
+the first cache. What does not depend on the batch (the tangents of a Jacobian, say) is worked out once for all of it.
+The C is plain: vectors come from the compiler's `omp simd`. It may neither reorder nor fuse a product into a sum: then
+what adds zero changes no bit of the rest, whatever stands around it, and an effect at its neutral value is neutral.
 """
 
 from dataclasses import dataclass
@@ -51,7 +51,7 @@ class Slot:
 
 
 def written(precision: str, corners: int, ins: list[Slot], inputs: list[list[Node]], outs: list[Slot],
-            outputs: list[list[Number]]) -> str:  # fmt: skip
+            outputs: list[list[Number]], width: int = WIDTH) -> str:  # fmt: skip
     """The C of a loop.
 
     Args:
@@ -59,15 +59,16 @@ def written(precision: str, corners: int, ins: list[Slot], inputs: list[list[Nod
         corners: nodes of an element.
         ins, inputs: arguments after the cells, and the node that stands for each of their numbers (nodal: c x corners).
         outs, outputs: results and what they are, likewise.
+        width: elements of a block.
     """
-    return _Writer(precision, corners, ins, inputs, outs, outputs).text()
+    return _Writer(precision, corners, ins, inputs, outs, outputs, width).text()
 
 
 class _Writer:
-    def __init__(self, precision, corners, ins, inputs, outs, outputs):
+    def __init__(self, precision, corners, ins, inputs, outs, outputs, width):
         self.real, self.f = ("float", "f") if precision == "float32" else ("double", "")
         self.corners, self.ins, self.inputs, self.outs, self.outputs = corners, ins, inputs, outs, outputs
-        self.batch = any(s.batched for s in ins)
+        self.width, self.batch = width, any(s.batched for s in ins)
         self.names: dict[int, str] = {}
         self.order: list[Node] = []
         self.used: set[str] = set()
@@ -153,7 +154,7 @@ class _Writer:
     def _sizes(self) -> dict:
         batched = next((i for i, s in enumerate(self.ins) if s.batched), None)
         return {
-            "width": WIDTH, "inputs": len(self.ins) + 1, "outputs": len(self.outs),
+            "inputs": len(self.ins) + 1, "outputs": len(self.outs),
             "nodes": self._nodes(),
             "batch": "1" if batched is None else f"buffer(frame->args.args[{batched + 1}])->dims[0]",
         }  # fmt: skip
@@ -195,9 +196,9 @@ class _Writer:
             start = f"in{i}{which}{f' * {many}' if which and many else ''}"
             if slot.kind == "nodal":
                 k = self.corners
-                before.append(f"real g{i}[{slot.rows * k}][{WIDTH}];")
+                before.append(f"real g{i}[{slot.rows * k}][{self.width}];")
                 before.append(f"for (int a = 0; a < {k}; a++)")
-                before.append(f"  for (int i = 0; i < {WIDTH}; i++) {{")
+                before.append(f"  for (int i = 0; i < {self.width}; i++) {{")
                 before.append("    const int64_t at = cells[a * E + e + i];")
                 before += [f"    g{i}[{c * k} + a][i] = ({start})[{c} * N + at];" for c in range(slot.rows)]
                 before.append("  }")
@@ -209,9 +210,11 @@ class _Writer:
         return before, inside
 
     def _blocks(self) -> list[str]:
-        sums = [f"real sum{i}[{s.rows}][{WIDTH}] = {{{{0}}}};" for i, s in enumerate(self.outs) if s.kind == "uniform"]
+        sums = [
+            f"real sum{i}[{s.rows}][{self.width}] = {{{{0}}}};" for i, s in enumerate(self.outs) if s.kind == "uniform"
+        ]
         lines = [] if self.batch else sums
-        lines += [f"for (int64_t e = 0; e < E; e += {WIDTH}) {{"]
+        lines += [f"for (int64_t e = 0; e < E; e += {self.width}) {{"]
         before, inside = self._loads(False)
         work = [self.statement(n) for n in self.order if n.level == LANE and n.op != "input"]
         if not self.batch:
@@ -219,7 +222,7 @@ class _Writer:
             lines += ["  " + x for x in inner] + ["}"]
             return lines + self._sums("0", False)
         kept = [f"kept[{at}][i] = {self.names[node]};" for node, at in self.stored.items()]
-        inner = [*before, f"real kept[{max(1, len(self.stored))}][{WIDTH}];"]
+        inner = [*before, f"real kept[{max(1, len(self.stored))}][{self.width}];"]
         inner += self._vector(inside + work, kept) if inside + work else []
         inner.append("for (int64_t b = 0; b < B; b++) {")
         before, inside = self._loads(True)
@@ -233,7 +236,7 @@ class _Writer:
     def _vector(self, work: list[str], results: list[str]) -> list[str]:
         declared = [x for x in results if x.startswith("real ")]
         stores = [x for x in results if not x.startswith("real ")]
-        head = ["#pragma omp simd", f"for (int i = 0; i < {WIDTH}; i++) {{"]
+        head = ["#pragma omp simd", f"for (int i = 0; i < {self.width}; i++) {{"]
         return declared + head + ["  " + x for x in work + stores] + ["}"]
 
     def _results(self) -> list[str]:
@@ -241,7 +244,7 @@ class _Writer:
         for i, slot in enumerate(self.outs):
             which = f"b * {slot.rows} * E + " if self.batch else ""
             if slot.kind == "nodal":
-                lines.append(f"real o{i}[{slot.rows * self.corners}][{WIDTH}];")
+                lines.append(f"real o{i}[{slot.rows * self.corners}][{self.width}];")
             for r, p in enumerate(self.outputs[i]):
                 said = self.say(p)
                 if slot.kind == "nodal":
@@ -257,7 +260,7 @@ class _Writer:
         nodal = [(i, s) for i, s in enumerate(self.outs) if s.kind == "nodal"]
         if not nodal:
             return []
-        lines += [f"for (int i = 0; i < {WIDTH}; i++) {{"]
+        lines += [f"for (int i = 0; i < {self.width}; i++) {{"]
         lines += [f"  for (int a = 0; a < {k}; a++) {{", "    const int64_t at = cells[a * E + e + i];"]
         for i, slot in nodal:
             lines += [f"    out{i}[({b} * {slot.rows} + {c}) * N + at] += o{i}[{c * k} + a][i];"
@@ -269,7 +272,7 @@ class _Writer:
         for i, slot in enumerate(self.outs):
             if slot.kind == "uniform":
                 lines.append(f"for (int r = 0; r < {slot.rows}; r++)")
-                lines.append(f"  for (int i = 0; i < {WIDTH}; i++) out{i}[{b} * {slot.rows} + r] += sum{i}[r][i];")
+                lines.append(f"  for (int i = 0; i < {self.width}; i++) out{i}[{b} * {slot.rows} + r] += sum{i}[r][i];")
         return lines
 
 
