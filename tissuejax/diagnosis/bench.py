@@ -163,6 +163,10 @@ class Bench(abc.ABC):
         """The bench with predictions exact at `values`: itself, unless it corrects a cheaper simulation there."""
         return self
 
+    def nearer(self, values: Mapping[str, float]) -> "Bench":
+        """The bench with a correction taken anew at `values` where it was taken far away."""
+        return self
+
     def rooted(self, values: Mapping[str, float]) -> "Bench":
         """The bench about the base's fit: where predictions are costly, scores take their columns there."""
         return self

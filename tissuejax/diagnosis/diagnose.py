@@ -161,7 +161,7 @@ def diagnose(
             cut = blocks(whole)
             states = strain_states(whole) if kind == "homogeneous" else driven_states(whole)
             changing = kind == "homogeneous" and paced(sample)
-            of = discrepancy(series(whole, cut, states), cut.spread(whole.sigma), changing)
+            of = discrepancy(series(whole, cut, states), cut.spread(whole.sigma), changing, kind == "homogeneous")
         found = answer(bench, whole, cut, of, effort, noted)
         made = {"homogeneous": _material, "probing": _probing, "cutting": _cutting}[kind](sample, energy, base, found)
     if found.evidence.exhausted:

@@ -1,7 +1,9 @@
 """The simulations behind a probing bench: each run once, remembered, kept on disk, side by side on the cores.
 
 One recording at one set of values is one run. An effect at its neutral value changes no bit, so effects are compiled
-together in groups (few programs), and values of an effect whose amplitudes are all zero do not count. A diagnosis that
+together in groups (few programs), and values of an effect whose amplitudes are all zero do not count. A run that
+breaks down is done again with smaller steps: values far from the truth, stiff in volume, are on the way to it. A
+diagnosis that
 was stopped and is started again asks for the same runs in the same order and finds them on disk.
 """
 
@@ -41,6 +43,7 @@ GROUPS = (
     ("anisotropy", "energy-form"),
     ("gravity",),
 )
+SMALLER = 2.0  # times: the step of a run that broke down
 BATCH = 12  # runs after which progress is reported
 ROUGH = (12, 12, 5)  # elements of the mesh for differences
 # that counts; the mesh for differences at its speed; the same at twice that speed
@@ -97,7 +100,12 @@ class Runs:
             for i in range(0, len(missing), BATCH):
                 part = missing[i : i + BATCH]
                 jobs = [self.job(dict(values), r, kind) for r, kind, values in part]
-                for key, run in zip(part, workers.run_all(jobs, processes), strict=True):
+                done = workers.run_all(jobs, processes)
+                broken = [k for k, run in enumerate(done) if int(run.failed) >= 0]
+                again = [self.job(dict(values), r, kind, SMALLER) for r, kind, values in (part[k] for k in broken)]
+                for k, run in zip(broken, workers.run_all(again, processes) if again else (), strict=True):
+                    done[k] = run
+                for key, run in zip(part, done, strict=True):
                     self._keep(key, self._cut(key[0], run))
                 self.count += len(part)
                 self.report(self.count)
@@ -114,10 +122,10 @@ class Runs:
         one, other = self.ready[kind].settings, self.ready[COARSE].settings
         return math.prod(one.counts) / math.prod(other.counts) * other.compression / one.compression
 
-    def job(self, values: Mapping[str, float], recording: str, kind: str) -> workers.Job:
-        """What simulates one recording."""
+    def job(self, values: Mapping[str, float], recording: str, kind: str, finer: float = 1.0) -> workers.Job:
+        """What simulates one recording; with steps `finer` times smaller than usual."""
         _, _, counted = self._key(values, recording, kind)
-        return self._predictor(kind, counted).job(dict(counted), recording)
+        return self._predictor(kind, counted, finer).job(dict(counted), recording)
 
     def _key(self, values: Mapping[str, float], recording: str, kind: str) -> tuple:
         """Recording, simulation, and the values that count there: those of effects that are on, sorted."""
@@ -131,17 +139,19 @@ class Runs:
         counted = {p: v for p, v in own.items() if not p.startswith("effects.") or p.split(".")[1] in on}
         return recording, kind, tuple(sorted(counted.items()))
 
-    def _predictor(self, kind: str, values: Sequence[tuple[str, float]]) -> ProbingPredictor:
+    def _predictor(self, kind: str, values: Sequence[tuple[str, float]], finer: float) -> ProbingPredictor:
         named = {p.split(".")[1] for p, _ in values if p.startswith("effects.")}
         groups = tuple(g for i, g in enumerate(GROUPS) if i == 0 or named.intersection(g))
         lone = tuple(sorted(named.difference(*GROUPS)))
-        if (kind, groups, lone) not in self._models:
+        if (kind, groups, lone, finer) not in self._models:
             chosen = [self.effects[n] for n in (*sum(groups, ()), *lone) if n in self.effects]
             one = self.ready[kind]
+            if finer != 1.0:
+                one = one.with_settings(one.settings.changed(step=one.settings.step / finer))
             model = Model(one.model.energy, one.model.volumetric, tuple(chosen)).across(tuple(self.rows))
             made = ProbingPredictor(model, one.sample, one.names, one.settings, one.setups)
-            self._models[kind, groups, lone] = made
-        return self._models[kind, groups, lone]
+            self._models[kind, groups, lone, finer] = made
+        return self._models[kind, groups, lone, finer]
 
     def _cut(self, recording: str, run) -> np.ndarray:
         out = np.empty(self.rows[recording].stop - self.rows[recording].start)

@@ -13,6 +13,7 @@ the model of Kennedy and O'Hagan (2001), with the parts that rests of material t
 | slow | exponential in time (0.05, 0.25 and 1.5 of the recording), of each recording's own |
 | waning gain | the stress times exponential in time (0.5 of the recording): stiffness that comes and goes, or is lost |
 | white | what scatters from sample to sample beyond the stated noise |
+| sudden | what happens at once, where a judgement has found that something may have (`estimation.sudden`) |
 
 Amplitudes a_k are shares of the stress that the model predicts (law, gain, waning gain), of its peak in the recording
 (hysteresis), or of the measured peak there (slow, white). Of what the model predicts: about the stress of another model
@@ -27,6 +28,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+
+from tissuejax.estimation.sudden import Sudden, Timed
 
 LAW = {"law": 0.5, "fine law": 0.12}  # correlation lengths, of the range of strain
 ALIKE = 0.4  # correlation length of hysteresis, of the range of strain
@@ -64,7 +67,7 @@ class Part:
 
     Attributes:
         name: e.g. "gain", "hysteresis, wide".
-        family: "law", "gain", "hysteresis", "slow" or "white".
+        family: "law", "gain", "hysteresis", "slow", "white" or "sudden".
         factor: B = factor factor' (smooth parts have few columns), or None.
         within: B is block-diagonal, a block for each series; or None.
     """
@@ -118,6 +121,8 @@ class Discrepancy:
         turning: factors of hysteresis about a peak of one, by name.
         fixed: the parts that don't depend on the prediction.
         fading: of a gain that changes in time, by series, how alike two samples are; none where time says nothing.
+        timed: when each row was measured; None where what happens at once is not looked for.
+        sudden: what may have happened at once.
     """
 
     laws: tuple[tuple[str, Float[np.ndarray, "N r"]], ...]
@@ -126,6 +131,8 @@ class Discrepancy:
     turning: tuple[tuple[str, Float[np.ndarray, "N r"]], ...]
     fixed: tuple[Part, ...]
     fading: tuple[Float[np.ndarray, "n n"], ...]
+    timed: Timed | None = None
+    sudden: tuple[Sudden, ...] = ()
 
     def about(self, prediction: Float[np.ndarray, " N"]) -> tuple[Part, ...]:
         """The parts beside this prediction, Pa; always in the same order."""
@@ -140,16 +147,20 @@ class Discrepancy:
             for alike, a, b in zip(self.fading, edges, edges[1:], strict=False)
         )
         changing = (Part("waning gain", "slow", within=waning),) if waning else ()
-        return (*laws, *several, *turning, *self.fixed, *changing)
+        once = tuple(Part(s.name, "sudden", s.factor(prediction, self.timed)) for s in self.sudden)
+        return (*laws, *several, *turning, *self.fixed, *changing, *once)
 
 
-def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"], paced: bool = False) -> Discrepancy:
+def discrepancy(
+    series: Sequence[Series], sigma: Float[np.ndarray, " N"], paced: bool = False, at_once: bool = False
+) -> Discrepancy:
     """The discrepancy of these series, stacked in their order.
 
     Args:
         sigma: noise of each entry, Pa; entries that are means of more samples scatter less.
         paced: whether time is more than a function of the strain: else a gain that wanes is a law of each recording's
             own, and that part is left out.
+        at_once: whether what happens at once is looked for.
     """
     of = np.repeat(np.arange(len(series)), [len(s.time) for s in series])
     states = np.concatenate([s.states for s in series])
@@ -182,11 +193,13 @@ def discrepancy(series: Sequence[Series], sigma: Float[np.ndarray, " N"], paced:
     out.append(Part("white", "white", within=tuple(scatter)))
     laws = tuple((name, shared(length, modes)) for name, length in LAW.items())
     own = shared(LAW["law"], [(s.recording, s.mode) for s in series])
+    belongs_to = (belongs[:, None] == np.arange(len(recordings))).astype(float)
     return Discrepancy(
         laws,
-        (belongs[:, None] == np.arange(len(recordings))).astype(float),
+        belongs_to,
         own,
         turning,
         tuple(out),
         tuple(np.exp(-d / WANING) for d in apart if paced),
+        Timed(np.concatenate([s.time for s in series]), of, np.argmax(belongs_to, axis=1)) if at_once else None,
     )

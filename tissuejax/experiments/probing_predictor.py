@@ -58,7 +58,8 @@ class ProbingPredictor(Predictor):
 
     def with_settings(self, settings: ProbingSettings) -> "ProbingPredictor":
         """The same recordings simulated otherwise."""
-        if settings == self.settings.changed(compression=settings.compression):  # another speed needs no other mesh
+        if settings == self.settings.changed(compression=settings.compression, step=settings.step):
+            # another speed or step needs no other mesh
             scenes = {name: retimed(setup, settings) for name, setup in self.setups.items()}
             return ProbingPredictor(self.model, self.sample, self.names, settings, scenes)
         return self.prepare(self.model, self.sample, self.names, settings)

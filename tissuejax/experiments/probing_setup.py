@@ -96,7 +96,7 @@ def setups(model: Model, sample: Sample, names: Sequence[str], settings: Probing
 
 
 def retimed(setup: Setup, settings: ProbingSettings) -> Setup:
-    """The same setup at another compression; the time step stays, so that masses and penalty stay."""
+    """The same setup at another compression or another time step; masses follow the step, the penalty stays."""
     clock = setup.scene.clock
     steps = settings.changed(interval=float(clock.interval)).steps
     faster = Clock(

@@ -28,6 +28,9 @@ class Criteria:
             extrapolation.
         strange: by which factor such a part is wider. Ground: 10 makes of 1 to 2 % the 10 to
             20 % by which effects of the catalogue change a recording.
+        sudden: standard deviation of the half-normal prior of what happens at once, where something does: share of the
+            stress. Ground: a slip or a step worth a word is some per cent to a third of what is measured. Elsewhere it
+            is `shares["sudden"]`: as good as nothing.
         change: standard deviation of the half-normal (two-sided: normal) prior of an effect's amplitude: the change of
             the stress that it makes alone, as a share of the stress (root mean squares). Ground: effects worth a name
             are some per cent to a half of what is measured.
@@ -53,10 +56,11 @@ class Criteria:
     shares: Mapping[str, float] = field(
         default_factory=lambda: (
             {"law": 0.015, "gain": 0.015, "hysteresis": 0.01, "slow": 0.01, "white": 0.005}
-            | {"marker": 0.02, "onset": 0.01, "numerical": 1.0}
+            | {"marker": 0.02, "onset": 0.01, "numerical": 1.0, "sudden": 1e-4}
         )
     )
     strange: float = 10.0
+    sudden: float = 0.1
     change: float = 0.3
     rig: float = 0.1
     shape: float = float(np.log(5.0))

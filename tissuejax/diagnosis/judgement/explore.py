@@ -20,6 +20,7 @@ from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.judge import log_prior
 from tissuejax.diagnosis.judgement.scales import Scales, scaled, squared
+from tissuejax.diagnosis.judgement.sudden import beside, happened, joined
 from tissuejax.diagnosis.judgement.weigh import ROUNDS, Weighed, weigh
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.score import Score, complement, gain, trusted
@@ -30,6 +31,7 @@ from tissuejax.estimation.discrepancy import Discrepancy
 HOPEFUL = 8.0  # nats below the best set up to which other forms and further effects of a set are tried
 GIVEN_UP = 20.0  # nats below the best set: a set is not followed to the end of its fit
 PROMISED = 2.0  # times the gain of a linear step: fits gained 0.1 to 0.9 of it where it was 30 nats and more (p02)
+AGAIN = 6  # sets weighed anew where something may have happened at once
 LITTLE = -4.0  # nats: a nominee whose linear step promises less is not weighed
 
 
@@ -311,6 +313,19 @@ class Exploration:
         effort = {"rounds": self.effort.rounds, "iterations": self.effort.iterations}
         return weigh(self.scales, w.evidence.keys, start, self.criteria, bench=w.bench, **effort, **options)
 
+    def look_again(self) -> None:
+        """Weigh the best sets and the base anew beside what may have happened at once by the best of them."""
+        while (place := happened(self.scales, self.weighed[self.best], self.criteria)) is not None:
+            self._tell("looking at what happened at once beside", sorted(self.names(self.best)))
+            best = sorted(self.weighed, key=self.worth)[: -AGAIN - 1 : -1]
+            self.scales = joined(self.scales, place)
+            for key, w in self.weighed.items():
+                self.weighed[key] = beside(w, place)
+                if key in best or not key:
+                    again = self._settled(w, w.refit.values)
+                    if again.evidence.log_evidence > w.evidence.log_evidence:
+                        self.weighed[key] = again
+
     def _tell(self, stage: str, order: Sequence[str]) -> None:
         """Report what is done now, and the best so far."""
         best = " + ".join(sorted(self.names(self.best))) if self.weighed else ""
@@ -357,6 +372,9 @@ def explore(
     if (noise := coloured(scales.blocked, bench, cut, base.refit.prediction)) is not None:
         scales.blocked = noise
         base = weigh(scales, (), base.refit.values, criteria)
+    while (place := happened(scales, base, criteria)) is not None:
+        e.scales = scales = joined(scales, place)
+        base = weigh(scales, (), base.refit.values, criteria)
     scales.values, scales.reference = base.refit.values, scales.cut.mean(base.refit.prediction)
     scales.bench = e.bench = (base.bench or bench).anchored(base.refit.values).rooted(base.refit.values)
     scales.bench.free = bench.free  # without the priors of a set
@@ -379,4 +397,5 @@ def explore(
         e.settle(size + 1)
         e.leave_out(e.best)
         e.settle(size)
+    e.look_again()
     return e

@@ -227,12 +227,12 @@ class Widths:
 
     Attributes:
         width: by part, shares of the stress.
-        chance, factor: that a part is wider, and by how much.
+        chance, factor: that a part is wider, and by how much; `factor` one for all, or by part.
     """
 
     width: Float[np.ndarray, " K"]
     chance: Float[np.ndarray, " K"]
-    factor: float = 10.0
+    factor: float | Float[np.ndarray, " K"] = 10.0
 
     def _two(self, u: Float[np.ndarray, "... K"]) -> tuple[np.ndarray, np.ndarray]:
         with np.errstate(divide="ignore"):
@@ -255,7 +255,8 @@ class Widths:
 
     def part(self, k: int) -> "Widths":
         """Of one part alone."""
-        return Widths(self.width[k : k + 1], self.chance[k : k + 1], self.factor)
+        factor = np.broadcast_to(self.factor, self.width.shape)
+        return Widths(self.width[k : k + 1], self.chance[k : k + 1], factor[k : k + 1])
 
     @property
     def widest(self) -> "Widths":

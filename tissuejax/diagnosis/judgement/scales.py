@@ -29,6 +29,7 @@ class Scales:
         reference: the stress that it predicts, block means, Pa.
         peak: the largest stress, Pa.
         size: against which the rest is measured, by block: the peak, or what noise makes of it (`Criteria.unseen`).
+        places: where something may have happened at once.
     """
 
     bench: Bench
@@ -40,6 +41,7 @@ class Scales:
     reference: Float[np.ndarray, " M"]
     peak: float
     size: Float[np.ndarray, " M"] | None = None
+    places: int = 0
 
     def about(self, prediction: Float[np.ndarray, " N"], bench: Bench) -> tuple[Part, ...]:
         """The discrepancy's parts beside a prediction (a long vector), and what the simulation has wrong there."""
@@ -61,8 +63,13 @@ class Scales:
         free = np.array([f not in named for f in self.families])
         partly = np.array([f not in wide and named.get(f) in acting for f in self.families])
         width = np.array([wide.get(f, criteria.shares[f]) for f in self.families])
-        chance = free * criteria.unknown / max(int(np.sum(free)), 1) + 0.5 * partly
-        return Widths(width, chance, criteria.strange)
+        sudden = np.array([f == "sudden" for f in self.families])
+        several = max(int(np.sum(free & ~sudden)), 1)
+        chance = free * criteria.unknown / several + 0.5 * partly
+        if not sudden.any():
+            return Widths(width, chance, criteria.strange)
+        chance = np.where(sudden, criteria.unknown / max(self.places, 1), chance)
+        return Widths(width, chance, np.where(sudden, criteria.sudden / width, criteria.strange))
 
     def widened(self, keys: Sequence[str]) -> frozenset[str]:
         """Families of the discrepancy that are the business of the effects `keys`, in whatever form they act."""

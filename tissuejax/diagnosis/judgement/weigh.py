@@ -50,6 +50,7 @@ class Weighed:
         parts: of the discrepancy, about the fit.
         rest: the discrepancy's posterior mean over the blocks, Pa.
         bench: that it was weighed on; `settled`: whether its predictions are exact at the fit.
+        linear: the problem about the fit; None of an impossible set.
     """
 
     evidence: SetEvidence
@@ -59,6 +60,7 @@ class Weighed:
     rest: Float[np.ndarray, " M"]
     bench: Bench | None = None
     settled: bool = True
+    linear: Linear | None = None
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,7 @@ def weigh(
     bench, priors = with_priors(scales, keys, start, criteria, bench)
     y, best = scales.cut.mean(bench.y), None
     at, tolerance, raw = dict(start), 0.5, None
-    bench = bench.anchored(at) if anchor else bench
+    bench = bench.anchored(at) if anchor else bench.nearer(at)
     parts = scales.about(bench.predict(at), bench)
     for _turn in range(rounds):
         misfit = Whitening(bench, scales.cut, scales.blocked, parts, v)
@@ -273,7 +275,8 @@ def _described(scales: Scales, keys: Sequence[str], best: Round, criteria: Crite
         rest=(float(np.mean(left**2 + open_still)) + spiky, wobble(left, open_still, 1.0)),
         numerical=numerical(scales, parts, v),
     )
-    return Weighed(evidence, fit, v, parts, left * (scales.peak if scales.size is None else scales.size), bench)
+    size = scales.peak if scales.size is None else scales.size
+    return Weighed(evidence, fit, v, parts, left * size, bench, linear=best.linear)
 
 
 def _resting(c: Candidate, fit: Refit, bench: Bench, at_bound: Sequence[str], v: np.ndarray, families) -> bool:

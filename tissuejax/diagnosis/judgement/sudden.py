@@ -1,0 +1,97 @@
+"""Whether something happened at once that no smooth part of the discrepancy describes, and where.
+
+At a fit, every place is asked what a part that begins there would gain, its amplitude integrated over its prior
+(`Marginal.along`, in closed form). Where all places together make it likelier than not that something happened, the
+best of them comes into the discrepancy of every set, with the prior probability of that one place: sets of effects then
+compete with it, as they do with everything else that has no name.
+"""
+
+import copy
+import math
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import cho_solve
+from scipy.special import logsumexp
+
+from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.marginal import Linear, factored, smooth
+from tissuejax.diagnosis.judgement.scales import Scales
+from tissuejax.diagnosis.judgement.weigh import Weighed
+from tissuejax.estimation.discrepancy import Discrepancy, Part
+from tissuejax.estimation.sudden import Sudden
+
+SEVERAL = 2  # places that come in at most
+AMPLITUDES = np.geomspace(0.01, 1.0, 25)  # of what is usual where something happened
+
+
+def happened(scales: Scales, at: Weighed, criteria: Criteria) -> Sudden | None:
+    """The likeliest place, where something is likelier to have happened at once than not; beside the set `at`."""
+    of = scales.discrepancy
+    if not isinstance(of, Discrepancy) or of.timed is None or len(of.sudden) >= SEVERAL or at.linear is None:
+        return None
+    places = _places(scales)
+    prediction = scales.cut.mean(at.refit.prediction)
+    factors = [p.factor(prediction, of.timed) for p in places]
+    gains = _gains(scales, at, at.linear, factors, criteria.sudden)
+    odds = gains + math.log(criteria.unknown / len(places))
+    if logsumexp(odds) < 0:
+        return None
+    return places[int(np.argmax(odds))]
+
+
+def beside(w: Weighed, place: Sudden) -> Weighed:
+    """What was weighed without this place, as it is where nothing happened there."""
+    if w.linear is None:
+        return w
+    part = Part(place.name, "sudden", np.zeros((len(w.rest), 1)))
+    evidence = replace(w.evidence, amplitudes={**w.evidence.amplitudes, place.name: 0.0})
+    return replace(w, evidence=evidence, v=np.append(w.v, 0.0), parts=(*w.parts, part))
+
+
+def _places(scales: Scales) -> list[Sudden]:
+    names = list(dict.fromkeys(s.recording for s in scales.bench.segments))
+    return scales.discrepancy.timed.places(names, scales.cut.mean(scales.bench.y))
+
+
+def _gains(scales: Scales, at: Weighed, linear: Linear, factors: list[np.ndarray], width: float) -> np.ndarray:
+    """Log evidence that a part of each factor gains, its amplitude half-normal of this width."""
+    inverse = [np.linalg.inv(b) for b in scales.blocked.within(at.parts, at.v)]
+
+    def solve(x: np.ndarray) -> np.ndarray:
+        return np.concatenate([i @ x[rows] for i, rows in zip(inverse, scales.blocked.rows, strict=True)])
+
+    u = smooth(at.parts, at.v)
+    w = np.concatenate([u, linear.jacobian], axis=1)
+    prior = np.concatenate([np.ones(u.shape[1]), linear.weak])
+    g = solve(w)
+    m = w.T @ g + np.diag(prior)
+    size = 1 / np.sqrt(np.maximum(np.diag(m), 1e-300))
+    c = factored(m * np.outer(size, size))
+
+    def projected(x: np.ndarray) -> np.ndarray:
+        return solve(x) - g @ (size[:, None] * cho_solve(c, size[:, None] * (g.T @ x), check_finite=False))
+
+    whole = np.concatenate(factors, axis=1)
+    moved, left = projected(whole), projected(linear.residual[:, None])[:, 0]
+    density = -0.5 * AMPLITUDES**2 + 0.5 * math.log(2 / math.pi) + np.log(AMPLITUDES)
+    density += math.log(math.log(AMPLITUDES[1] / AMPLITUDES[0]))
+    d, out, first = (width * AMPLITUDES) ** 2, [], 0
+    for f in factors:
+        columns = slice(first, first + f.shape[1])
+        first += f.shape[1]
+        values, turn = np.linalg.eigh(f.T @ moved[:, columns])
+        grown = 1 + np.outer(d, np.maximum(values, 0.0))
+        change = -0.5 * np.sum(np.log(grown), axis=1) + 0.5 * d * np.sum((turn.T @ (f.T @ left)) ** 2 / grown, axis=1)
+        out.append(logsumexp(change + density))
+    return np.array(out)
+
+
+def joined(scales: Scales, place: Sudden) -> Scales:
+    """The same scales with this place in the discrepancy of every set."""
+    made = copy.copy(scales)
+    of = scales.discrepancy
+    made.discrepancy = replace(of, sudden=(*of.sudden, place))
+    made.families = (*scales.families, "sudden")
+    made.places = len(_places(scales))
+    return made
