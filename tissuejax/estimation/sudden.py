@@ -5,7 +5,7 @@ Two kinds of parts for `Discrepancy`, of low rank, where everything else that it
 | part | from when or where on | what it adds |
 |---|---|---|
 | moment | a time in one recording | a step of the stress, a change of gain, a clock that jumps |
-| limit | a level of the stress, in all recordings | what the model predicts beyond it, taken away again |
+| limit | a level of the stress in one recording, in its range | what the model predicts beyond it, taken away again |
 
 Where they begin is scanned: each place is as likely as any other.
 """
@@ -18,7 +18,7 @@ from jaxtyping import Bool, Float
 CLOCK = 0.3  # of a recording's duration: by what a clock jumps where the stress would by its peak
 CLIPPED = 10.0  # of what is beyond a limit, at an amplitude of one: at a tenth of that all of it
 EDGE, MOST = 3, 40  # blocks at either end of a recording that show no step; places in a recording at most
-LEVELS = (0.6, 0.98, 16)  # of the largest stress: limits from, to, how many
+LEVELS = (0.7, 1.0, 16)  # of the largest stress of a recording: limits from, to, how many
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Timed:
         return out
 
     def places(self, names: list[str], measured: Float[np.ndarray, " N"]) -> list[Sudden]:
-        """Everything that may have happened: moments of each recording, and limits of the sensor.
+        """Everything that may have happened in each recording: moments, and limits of the sensor.
 
         Args:
             names: of the recordings, in order.
@@ -84,9 +84,7 @@ class Timed:
             times = np.unique(self.time[own])[EDGE:-EDGE]
             for t in times[:: max(len(times) // MOST, 1)]:
                 found.append(Sudden(f"at once in {name} at {t:.4g} s", own & (self.time >= t)))
-        low, high, several = LEVELS
-        largest = float(np.max(np.abs(measured)))
-        everywhere = np.ones(len(measured), bool)
-        for share in np.linspace(low, high, several):
-            found.append(Sudden(f"limit at {share * largest:.4g} Pa", everywhere, share * largest))
+            largest = float(np.max(np.abs(measured[own])))
+            for level in largest * np.linspace(*LEVELS):
+                found.append(Sudden(f"limit in {name} at {level:.4g} Pa", own, float(level)))
         return found

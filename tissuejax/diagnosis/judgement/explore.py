@@ -20,7 +20,7 @@ from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.judge import log_prior
 from tissuejax.diagnosis.judgement.scales import Scales, scaled, squared
-from tissuejax.diagnosis.judgement.sudden import beside, happened, joined
+from tissuejax.diagnosis.judgement.sudden import begun, beside, disrupted, happened, held, joined
 from tissuejax.diagnosis.judgement.weigh import ROUNDS, Weighed, weigh
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.score import Score, complement, gain, trusted
@@ -303,8 +303,7 @@ class Exploration:
         while left := [k for k in self.near(size) if not self.weighed[k].settled]:
             w = self.weighed[left[0]]
             self._tell("settling", w.evidence.keys)
-            at = w.refit.values
-            again = self._settled(w, at, v=w.v)
+            again = self._settled(w, at := w.refit.values, v=w.v)
             if again.evidence.log_evidence == -math.inf:  # the fine simulation breaks down there
                 again = self._settled(w, {**at, **{p: self.scales.values[p] for p in self.bench.base}})
             self.weighed[left[0]] = again
@@ -322,9 +321,11 @@ class Exploration:
             for key, w in self.weighed.items():
                 self.weighed[key] = beside(w, place)
                 if key in best or not key:
-                    again = self._settled(w, w.refit.values)
+                    again = self._settled(w, w.refit.values, v=begun(w, self.criteria))
                     if again.evidence.log_evidence > w.evidence.log_evidence:
                         self.weighed[key] = again
+            if not held(self.weighed[self.best], place):
+                break
 
     def _tell(self, stage: str, order: Sequence[str]) -> None:
         """Report what is done now, and the best so far."""
@@ -362,7 +363,6 @@ def explore(
         report("fitting the base model")
     bench = bench.anchored(start)
     scales = scaled(bench, cut, of, bench.y, start, criteria)
-    e = Exploration(bench, criteria, effort, scales, report or (lambda _: None))
     base = weigh(scales, (), start, criteria)
     if not np.isfinite(base.evidence.log_evidence):
         raise NotConverged(
@@ -372,13 +372,11 @@ def explore(
     if (noise := coloured(scales.blocked, bench, cut, base.refit.prediction)) is not None:
         scales.blocked = noise
         base = weigh(scales, (), base.refit.values, criteria)
-    while (place := happened(scales, base, criteria)) is not None:
-        e.scales = scales = joined(scales, place)
-        base = weigh(scales, (), base.refit.values, criteria)
+    scales, base = disrupted(scales, base, criteria)
     scales.values, scales.reference = base.refit.values, scales.cut.mean(base.refit.prediction)
-    scales.bench = e.bench = (base.bench or bench).anchored(base.refit.values).rooted(base.refit.values)
+    scales.bench = (base.bench or bench).anchored(base.refit.values).rooted(base.refit.values)
     scales.bench.free = bench.free  # without the priors of a set
-    e.weighed[frozenset()] = base
+    e = Exploration(scales.bench, criteria, effort, scales, report or (lambda _: None), {frozenset(): base})
     e.extend([frozenset()], effort.singles, effort.singles)
     for key in e.near(1)[: effort.reshaped[0]]:
         e.reshape(key)

@@ -18,7 +18,7 @@ from scipy.special import logsumexp
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Marginal, Widths, marginal
 from tissuejax.estimation.discrepancy import Part
 
-GRID = np.geomspace(1e-4, 100.0, 500)  # amplitudes of the quadrature, of the prior's width
+LEAST, TEN, POINTS = 1e-4, 10.0, 500  # of the prior's width; of its widest; amplitudes of the quadrature
 KNOTS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0)  # of its width: amplitudes at which a part at rest is taken
 AROUND = (-16, -8, -4, -2, -1, -0.5, 0, 0.5, 1, 2, 4, 8, 16)  # standard errors from where it is, where it moved
 FALLEN = -15.0  # nats: what lies beyond is nothing
@@ -29,15 +29,16 @@ def amplitude_mass(
     linear: Linear, parts: Sequence[Part], priors: Widths, blocked: Blocked, v: Float[np.ndarray, " K"], m: Marginal
 ) -> float:
     """Log of int p(y | a) p(a) da over p(y | v): `m` at `v`; see the module's text."""
-    total = 0.0
+    total, factor = 0.0, np.broadcast_to(priors.factor, priors.width.shape)
     for k, part in enumerate(parts):
-        a = priors.width[k] * GRID
+        grid = np.geomspace(LEAST, TEN * factor[k], POINTS)
+        a = priors.width[k] * grid
         if part.factor is not None:
             change = m.along(k, a**2 - v[k])
         else:
             change = _within(linear, parts, priors, blocked, v, m, k)(a**2)
         density = priors.part(k).log_density((a**2)[:, None])[:, 0]
-        total += float(logsumexp(change + density + np.log(a))) + math.log(math.log(GRID[1] / GRID[0]))
+        total += float(logsumexp(change + density + np.log(a))) + math.log(math.log(grid[1] / grid[0]))
     moving = np.flatnonzero(v > MOVED * priors.width**2)
     if len(moving) > 1:
         f = m.fisher[np.ix_(moving, moving)]

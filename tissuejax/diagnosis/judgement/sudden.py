@@ -8,36 +8,60 @@ compete with it, as they do with everything else that has no name.
 
 import copy
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 from scipy.linalg import cho_solve
 from scipy.special import logsumexp
 
 from tissuejax.diagnosis.judgement.criteria import Criteria
-from tissuejax.diagnosis.judgement.marginal import Linear, factored, smooth
+from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, factored, smooth
 from tissuejax.diagnosis.judgement.scales import Scales
-from tissuejax.diagnosis.judgement.weigh import Weighed
+from tissuejax.diagnosis.judgement.weigh import Weighed, weigh
 from tissuejax.estimation.discrepancy import Discrepancy, Part
 from tissuejax.estimation.sudden import Sudden
 
-SEVERAL = 2  # places that come in at most
-AMPLITUDES = np.geomspace(0.01, 1.0, 25)  # of what is usual where something happened
+AMPLITUDES = np.geomspace(0.01, 4.0, 30)  # of what is usual where something happened
 
 
 def happened(scales: Scales, at: Weighed, criteria: Criteria) -> Sudden | None:
     """The likeliest place, where something is likelier to have happened at once than not; beside the set `at`."""
     of = scales.discrepancy
-    if not isinstance(of, Discrepancy) or of.timed is None or len(of.sudden) >= SEVERAL or at.linear is None:
+    if not isinstance(of, Discrepancy) or of.timed is None or at.linear is None:
         return None
-    places = _places(scales)
+    if len(of.sudden) > len({s.recording for s in scales.bench.segments}):  # one in each, and one more
+        return None
+    places, known = _places(scales), {s.name for s in of.sudden}
     prediction = scales.cut.mean(at.refit.prediction)
     factors = [p.factor(prediction, of.timed) for p in places]
-    gains = _gains(scales, at, at.linear, factors, criteria.sudden)
-    odds = gains + math.log(criteria.unknown / len(places))
+    odds = gains(scales.blocked, at.parts, at.v, at.linear, factors, criteria.sudden)
+    odds += math.log(criteria.unknown / len(places))
+    odds[[p.name in known for p in places]] = -math.inf
     if logsumexp(odds) < 0:
         return None
     return places[int(np.argmax(odds))]
+
+
+def disrupted(scales: Scales, base: Weighed, criteria: Criteria) -> tuple[Scales, Weighed]:
+    """Scales and base with all that may have happened beside the base alone, one place after the other."""
+    while (place := happened(scales, base, criteria)) is not None:
+        scales = joined(scales, place)
+        base = weigh(scales, (), base.refit.values, criteria, v=begun(base, criteria))
+        if not held(base, place):
+            break
+    return scales, base
+
+
+def held(w: Weighed, place: Sudden) -> bool:
+    """Whether something happened there beside what was weighed."""
+    return w.evidence.amplitudes.get(place.name, 0.0) > 0
+
+
+def begun(w: Weighed, criteria: Criteria) -> np.ndarray:
+    """Squared amplitudes from which a set is weighed anew with one place more."""
+    return np.append(w.v, criteria.sudden**2)
 
 
 def beside(w: Weighed, place: Sudden) -> Weighed:
@@ -54,14 +78,21 @@ def _places(scales: Scales) -> list[Sudden]:
     return scales.discrepancy.timed.places(names, scales.cut.mean(scales.bench.y))
 
 
-def _gains(scales: Scales, at: Weighed, linear: Linear, factors: list[np.ndarray], width: float) -> np.ndarray:
-    """Log evidence that a part of each factor gains, its amplitude half-normal of this width."""
-    inverse = [np.linalg.inv(b) for b in scales.blocked.within(at.parts, at.v)]
+def gains(
+    blocked: Blocked,
+    parts: Sequence[Part],
+    v: Float[np.ndarray, " K"],
+    linear: Linear,
+    factors: Sequence[Float[np.ndarray, "N r"]],
+    width: float,
+) -> Float[np.ndarray, " P"]:
+    """Log evidence that one part more gains, by its factor, its amplitude half-normal of this width."""
+    inverse = [np.linalg.inv(b) for b in blocked.within(parts, v)]
 
     def solve(x: np.ndarray) -> np.ndarray:
-        return np.concatenate([i @ x[rows] for i, rows in zip(inverse, scales.blocked.rows, strict=True)])
+        return np.concatenate([i @ x[rows] for i, rows in zip(inverse, blocked.rows, strict=True)])
 
-    u = smooth(at.parts, at.v)
+    u = smooth(parts, v)
     w = np.concatenate([u, linear.jacobian], axis=1)
     prior = np.concatenate([np.ones(u.shape[1]), linear.weak])
     g = solve(w)

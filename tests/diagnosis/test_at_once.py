@@ -1,0 +1,136 @@
+"""What happens at once: found where it was put in, no effect's business, and nothing where nothing happened."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import halfnorm
+from test_judgement import made
+
+from tissuejax.diagnosis.diagnose import diagnose
+from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.marginal import Widths, amplitudes, marginal
+from tissuejax.diagnosis.judgement.mass import amplitude_mass
+from tissuejax.diagnosis.judgement.sudden import gains
+from tissuejax.estimation.discrepancy import Part
+from tissuejax.estimation.sudden import Timed
+from tissuejax.recordings.recording import Channel, Recording, Sample
+from tissuejax.report.judged_sentences import sure
+
+MU, NOISE, STEP = 900.0, 4.0, 0.05
+TRIED = ("drift", "energy-form", "viscoelasticity", "slack", "periodic")
+QUICK = Effort(most=1, singles=5, reshaped=(1, 0, 0), starts=1)
+
+
+def stepping(n: int, at: int) -> np.ndarray:
+    return 1.0 * (np.arange(n) >= at)[:, None]
+
+
+def test_a_gain_over_places_is_the_integral_over_the_amplitude():
+    linear, parts, blocked = made(n=40)
+    v, n = np.full(len(parts), 1e-5), len(linear.residual)
+    factors = [50.0 * stepping(n, at) for at in (5, 17, 60)]
+    found = gains(blocked, parts, v, linear, factors, 0.1)
+    a = np.linspace(0, 0.5, 4000)
+    for factor, gain in zip(factors, found, strict=True):
+        wide = (*parts, Part("step", "sudden", factor))
+        values = [marginal(linear, wide, np.append(v, x**2), blocked).value for x in a[::20]]
+        logs = np.interp(a, a[::20], values) - marginal(linear, parts, v, blocked).value
+        exact = math.log(np.trapezoid(np.exp(logs) * halfnorm(scale=0.1).pdf(a), a))
+        assert gain == pytest.approx(exact, abs=0.03)
+
+
+def test_the_mass_of_a_part_that_is_nothing_or_a_thousand_times_as_wide_is_its_integral():
+    linear, _, blocked = made(n=40)
+    part = [Part("step", "sudden", 50.0 * stepping(len(linear.residual), 17))]
+    priors = Widths(np.array([1e-4]), np.array([1e-3]), np.array([1e3]))
+    v, m = amplitudes(linear, part, priors, blocked, np.array([0.01]))
+    a = np.concatenate([np.linspace(0, 1e-3, 3000), np.linspace(1.01e-3, 0.6, 6000)])
+    logs = np.array([marginal(linear, part, np.array([x**2]), blocked).value for x in a[::5]])
+    logs = np.interp(a, a[::5], logs)
+    density = 0.999 * halfnorm(scale=1e-4).pdf(a) + 1e-3 * halfnorm(scale=0.1).pdf(a)
+    exact = math.log(np.trapezoid(np.exp(logs - m.value) * density, a))
+    assert amplitude_mass(linear, part, priors, blocked, v, m) == pytest.approx(exact, abs=0.05)
+
+
+def test_a_moment_adds_a_step_a_gain_and_a_late_clock_and_a_limit_takes_away_what_is_beyond():
+    time = np.tile(np.linspace(0, 10, 21), 2)
+    owner = np.repeat([0, 1], 21)
+    timed, prediction = Timed(time, owner, owner), 3.0 * time
+    places = timed.places(["r1", "r2"], prediction)
+    moment = next(p for p in places if p.name == "at once in r2 at 5 s")
+    step, gain, late = moment.factor(prediction, timed).T
+    inside = (owner == 1) & (time >= 5)
+    assert step == pytest.approx(30.0 * inside)
+    assert gain == pytest.approx(prediction * inside)
+    assert late == pytest.approx(0.3 * 3.0 * 10 * inside)  # slope times the duration
+    limit = next(p for p in places if p.name == "limit in r1 at 24 Pa")
+    assert limit.factor(prediction, timed)[:, 0] == pytest.approx(
+        -10 * np.maximum(prediction - 24, 0) * (owner == 0), abs=1e-9
+    )
+
+
+def recorded(disturbed) -> Sample:
+    """Pulls and pushes with holds of a neo-Hookean specimen in closed form, `disturbed` in stretch and stress."""
+    rng, recordings = np.random.default_rng(5), {}
+    for name, far, ramp in (("slow", 1.3, 6.0), ("quick", 1.25, 2.0), ("push", 0.8, 3.0), ("last", 1.2, 2.5)):
+        time = np.arange(0, 3 * ramp + 12, STEP)
+        stretch = np.interp(time, [0, 1, 1 + ramp, 9 + ramp, 9 + 2 * ramp], [1, 1, far, far, 1])
+        y = disturbed(name, time, stretch, lambda x: MU * (x - x**-2))
+        channel = Channel(time, y + NOISE * rng.standard_normal(len(time)), "Pa", NOISE)
+        known = {"area": 1e-4, "height": 0.01}
+        recordings[name] = Recording(
+            name, "uniaxial", {"time": time, "stretch": stretch}, {"nominal_stress": channel}, known
+        )
+    return Sample("at once", recordings)
+
+
+def slipping(name, time, stretch, law):
+    """The grip lets go by 0.04 in the hold of one recording, and by 0.03 in that of another."""
+    gone = {"slow": (10.0, 0.04), "last": (7.0, 0.03)}.get(name, (1e9, 0.0))
+    return law(stretch - gone[1] * (time >= gone[0]))
+
+
+def clipping(name, time, stretch, law):
+    return np.clip(law(stretch), -0.8 * 520, 0.8 * 520)
+
+
+def relaxing(name, time, stretch, law):
+    """A share of 0.3 of the stress relaxes with 2 s: a sum over the steps of the elastic stress."""
+    elastic = law(stretch)
+    decay, carried, out = np.exp(-STEP / 2.0), 0.0, np.zeros(len(time))
+    for i in range(1, len(time)):
+        carried = decay * carried + (elastic[i] - elastic[i - 1])
+        out[i] = 0.7 * elastic[i] + 0.3 * carried
+    return out
+
+
+def asked(disturbed):
+    return diagnose(recorded(disturbed), "neo-hookean", effects=TRIED, effort=QUICK)
+
+
+def test_a_grip_that_slips_is_no_relaxation_and_the_page_says_when():
+    answer = asked(slipping)
+    assert answer.verdict.kind == "unexplained"
+    parts = answer.as_dict()["rest"]["parts"]
+    when = {k.split()[3]: float(k.split()[-2]) for k, v in parts.items() if k.startswith("at once") and v > 1e-3}
+    assert when["slow"] == pytest.approx(10.0, abs=0.8)
+    assert when["last"] == pytest.approx(7.0, abs=0.8)
+    assert any("at once in slow" in sentence for sentence in sure(answer))
+
+
+def test_what_relaxes_is_not_taken_for_something_that_happened_at_once():
+    answer = asked(relaxing)
+    assert [e["name"] for e in answer.as_dict()["effects"]] == ["viscoelasticity"]
+    assert answer.verdict.kind == "found"
+    parts = answer.as_dict()["rest"]["parts"]
+    assert not [k for k, v in parts.items() if k.startswith(("at once", "limit")) and v > 1e-3]
+
+
+def test_a_sensor_at_its_limit_leaves_a_limit():
+    answer = asked(clipping)
+    parts = answer.as_dict()["rest"]["parts"]
+    limits = [k for k, v in parts.items() if k.startswith("limit") and v > 1e-3]
+    assert answer.verdict.kind in ("unexplained", "found-in-part")
+    assert limits
+    assert all(float(k.split()[-2]) == pytest.approx(0.8 * 520, rel=0.05) for k in limits)
