@@ -26,7 +26,7 @@ def stepping(n: int, at: int) -> np.ndarray:
     return 1.0 * (np.arange(n) >= at)[:, None]
 
 
-def test_a_gain_over_places_is_the_integral_over_the_amplitude():
+def test_the_gain_of_a_moment_is_the_integral_over_the_amplitude():
     linear, parts, blocked = made(n=40)
     v, n = np.full(len(parts), 1e-5), len(linear.residual)
     factors = [50.0 * stepping(n, at) for at in (5, 17, 60)]
@@ -53,21 +53,16 @@ def test_the_mass_of_a_part_that_is_nothing_or_a_thousand_times_as_wide_is_its_i
     assert amplitude_mass(linear, part, priors, blocked, v, m) == pytest.approx(exact, abs=0.05)
 
 
-def test_a_moment_adds_a_step_a_gain_and_a_late_clock_and_a_limit_takes_away_what_is_beyond():
+def test_a_moment_adds_a_step_a_gain_and_a_late_clock():
     time = np.tile(np.linspace(0, 10, 21), 2)
     owner = np.repeat([0, 1], 21)
     timed, prediction = Timed(time, owner, owner), 3.0 * time
-    places = timed.places(["r1", "r2"], prediction)
-    moment = next(p for p in places if p.name == "at once in r2 at 5 s")
+    moment = next(m for m in timed.moments(["r1", "r2"]) if m.name == "at once in r2 at 5 s")
     step, gain, late = moment.factor(prediction, timed).T
     inside = (owner == 1) & (time >= 5)
     assert step == pytest.approx(30.0 * inside)
     assert gain == pytest.approx(prediction * inside)
     assert late == pytest.approx(0.3 * 3.0 * 10 * inside)  # slope times the duration
-    limit = next(p for p in places if p.name == "limit in r1 at 24 Pa")
-    assert limit.factor(prediction, timed)[:, 0] == pytest.approx(
-        -10 * np.maximum(prediction - 24, 0) * (owner == 0), abs=1e-9
-    )
 
 
 def recorded(disturbed) -> Sample:
@@ -89,10 +84,6 @@ def slipping(name, time, stretch, law):
     """The grip lets go by 0.04 in the hold of one recording, and by 0.03 in that of another."""
     gone = {"slow": (10.0, 0.04), "last": (7.0, 0.03)}.get(name, (1e9, 0.0))
     return law(stretch - gone[1] * (time >= gone[0]))
-
-
-def clipping(name, time, stretch, law):
-    return np.clip(law(stretch), -0.8 * 520, 0.8 * 520)
 
 
 def relaxing(name, time, stretch, law):
@@ -124,13 +115,4 @@ def test_what_relaxes_is_not_taken_for_something_that_happened_at_once():
     assert [e["name"] for e in answer.as_dict()["effects"]] == ["viscoelasticity"]
     assert answer.verdict.kind == "found"
     parts = answer.as_dict()["rest"]["parts"]
-    assert not [k for k, v in parts.items() if k.startswith(("at once", "limit")) and v > 1e-3]
-
-
-def test_a_sensor_at_its_limit_leaves_a_limit():
-    answer = asked(clipping)
-    parts = answer.as_dict()["rest"]["parts"]
-    limits = [k for k, v in parts.items() if k.startswith("limit") and v > 1e-3]
-    assert answer.verdict.kind in ("unexplained", "found-in-part")
-    assert limits
-    assert all(float(k.split()[-2]) == pytest.approx(0.8 * 520, rel=0.05) for k in limits)
+    assert not [k for k, v in parts.items() if k.startswith("at once") and v > 1e-3]

@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from tissuejax.estimation.sudden import Sudden, Timed
+from tissuejax.estimation.sudden import Moment, Timed
 
 LAW = {"law": 0.5, "fine law": 0.12}  # correlation lengths, of the range of strain
 ALIKE = 0.4  # correlation length of hysteresis, of the range of strain
@@ -132,7 +132,7 @@ class Discrepancy:
     fixed: tuple[Part, ...]
     fading: tuple[Float[np.ndarray, "n n"], ...]
     timed: Timed | None = None
-    sudden: tuple[Sudden, ...] = ()
+    sudden: tuple[Moment, ...] = ()
 
     def about(self, prediction: Float[np.ndarray, " N"]) -> tuple[Part, ...]:
         """The parts beside this prediction, Pa; always in the same order."""

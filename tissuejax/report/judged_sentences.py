@@ -28,7 +28,7 @@ PARTS = {
 
 
 def _part(name: str) -> str:
-    if name not in PARTS and name.startswith(("at once in ", "limit in ")):
+    if name not in PARTS and name.startswith("at once in "):
         return name
     stem, _, channel = name.partition(" of ")
     return f"{PARTS[stem]}{f' ({channel})' if channel else ''}"

@@ -314,17 +314,17 @@ class Exploration:
 
     def look_again(self) -> None:
         """Weigh the best sets and the base anew beside what may have happened at once by the best of them."""
-        while (place := happened(self.scales, self.weighed[self.best], self.criteria)) is not None:
+        while (moment := happened(self.scales, self.weighed[self.best], self.criteria)) is not None:
             self._tell("looking at what happened at once beside", sorted(self.names(self.best)))
             best = sorted(self.weighed, key=self.worth)[: -AGAIN - 1 : -1]
-            self.scales = joined(self.scales, place)
+            self.scales = joined(self.scales, moment)
             for key, w in self.weighed.items():
-                self.weighed[key] = beside(w, place)
+                self.weighed[key] = beside(w, moment)
                 if key in best or not key:
                     again = self._settled(w, w.refit.values, v=begun(w, self.criteria))
                     if again.evidence.log_evidence > w.evidence.log_evidence:
                         self.weighed[key] = again
-            if not held(self.weighed[self.best], place):
+            if not held(self.weighed[self.best], moment):
                 break
 
     def _tell(self, stage: str, order: Sequence[str]) -> None:

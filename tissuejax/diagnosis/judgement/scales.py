@@ -29,7 +29,7 @@ class Scales:
         reference: the stress that it predicts, block means, Pa.
         peak: the largest stress, Pa.
         size: against which the rest is measured, by block: the peak, or what noise makes of it (`Criteria.unseen`).
-        places: where something may have happened at once.
+        moments: at which something may have happened at once.
     """
 
     bench: Bench
@@ -41,7 +41,7 @@ class Scales:
     reference: Float[np.ndarray, " M"]
     peak: float
     size: Float[np.ndarray, " M"] | None = None
-    places: int = 0
+    moments: int = 0
 
     def about(self, prediction: Float[np.ndarray, " N"], bench: Bench) -> tuple[Part, ...]:
         """The discrepancy's parts beside a prediction (a long vector), and what the simulation has wrong there."""
@@ -68,7 +68,7 @@ class Scales:
         chance = free * criteria.unknown / several + 0.5 * partly
         if not sudden.any():
             return Widths(width, chance, criteria.strange)
-        chance = np.where(sudden, criteria.unknown / max(self.places, 1), chance)
+        chance = np.where(sudden, criteria.unknown / max(self.moments, 1), chance)
         return Widths(width, chance, np.where(sudden, criteria.sudden / width, criteria.strange))
 
     def widened(self, keys: Sequence[str]) -> frozenset[str]:

@@ -1,8 +1,8 @@
 """Whether something happened at once that no smooth part of the discrepancy describes, and where.
 
-At a fit, every place is asked what a part that begins there would gain, its amplitude integrated over its prior
-(`Marginal.along`, in closed form). Where all places together make it likelier than not that something happened, the
-best of them comes into the discrepancy of every set, with the prior probability of that one place: sets of effects then
+At a fit, every moment is asked what a part that begins there would gain, its amplitude integrated over its prior (in
+closed form, as `Marginal.along`). Where all moments together make it likelier than not that something happened, the
+best of them comes into the discrepancy of every set, with the prior probability of that one: sets of effects then
 compete with it, as they do with everything else that has no name.
 """
 
@@ -21,61 +21,62 @@ from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, factored, sm
 from tissuejax.diagnosis.judgement.scales import Scales
 from tissuejax.diagnosis.judgement.weigh import Weighed, weigh
 from tissuejax.estimation.discrepancy import Discrepancy, Part
-from tissuejax.estimation.sudden import Sudden
+from tissuejax.estimation.sudden import Moment
 
 AMPLITUDES = np.geomspace(0.01, 4.0, 30)  # of what is usual where something happened
 
 
-def happened(scales: Scales, at: Weighed, criteria: Criteria) -> Sudden | None:
-    """The likeliest place, where something is likelier to have happened at once than not; beside the set `at`."""
+def happened(scales: Scales, at: Weighed, criteria: Criteria) -> Moment | None:
+    """The likeliest moment, where something is likelier to have happened at once than not; beside the set `at`."""
     of = scales.discrepancy
     if not isinstance(of, Discrepancy) or of.timed is None or at.linear is None:
         return None
     if len(of.sudden) > len({s.recording for s in scales.bench.segments}):  # one in each, and one more
         return None
-    places, known = _places(scales), {s.name for s in of.sudden}
+    moments, known = _moments(scales), {s.name for s in of.sudden}
+    if not moments:
+        return None
     prediction = scales.cut.mean(at.refit.prediction)
-    factors = [p.factor(prediction, of.timed) for p in places]
+    factors = [p.factor(prediction, of.timed) for p in moments]
     odds = gains(scales.blocked, at.parts, at.v, at.linear, factors, criteria.sudden)
-    odds += math.log(criteria.unknown / len(places))
-    odds[[p.name in known for p in places]] = -math.inf
+    odds += math.log(criteria.unknown / len(moments))
+    odds[[p.name in known for p in moments]] = -math.inf
     if logsumexp(odds) < 0:
         return None
-    return places[int(np.argmax(odds))]
+    return moments[int(np.argmax(odds))]
 
 
 def disrupted(scales: Scales, base: Weighed, criteria: Criteria) -> tuple[Scales, Weighed]:
-    """Scales and base with all that may have happened beside the base alone, one place after the other."""
-    while (place := happened(scales, base, criteria)) is not None:
-        scales = joined(scales, place)
+    """Scales and base with all that may have happened beside the base alone, one after the other."""
+    while (moment := happened(scales, base, criteria)) is not None:
+        scales = joined(scales, moment)
         base = weigh(scales, (), base.refit.values, criteria, v=begun(base, criteria))
-        if not held(base, place):
+        if not held(base, moment):
             break
     return scales, base
 
 
-def held(w: Weighed, place: Sudden) -> bool:
+def held(w: Weighed, moment: Moment) -> bool:
     """Whether something happened there beside what was weighed."""
-    return w.evidence.amplitudes.get(place.name, 0.0) > 0
+    return w.evidence.amplitudes.get(moment.name, 0.0) > 0
 
 
 def begun(w: Weighed, criteria: Criteria) -> np.ndarray:
-    """Squared amplitudes from which a set is weighed anew with one place more."""
+    """Squared amplitudes from which a set is weighed anew with one moment more."""
     return np.append(w.v, criteria.sudden**2)
 
 
-def beside(w: Weighed, place: Sudden) -> Weighed:
-    """What was weighed without this place, as it is where nothing happened there."""
+def beside(w: Weighed, moment: Moment) -> Weighed:
+    """What was weighed without this moment, as it is where nothing happened there."""
     if w.linear is None:
         return w
-    part = Part(place.name, "sudden", np.zeros((len(w.rest), 1)))
-    evidence = replace(w.evidence, amplitudes={**w.evidence.amplitudes, place.name: 0.0})
+    part = Part(moment.name, "sudden", np.zeros((len(w.rest), 1)))
+    evidence = replace(w.evidence, amplitudes={**w.evidence.amplitudes, moment.name: 0.0})
     return replace(w, evidence=evidence, v=np.append(w.v, 0.0), parts=(*w.parts, part))
 
 
-def _places(scales: Scales) -> list[Sudden]:
-    names = list(dict.fromkeys(s.recording for s in scales.bench.segments))
-    return scales.discrepancy.timed.places(names, scales.cut.mean(scales.bench.y))
+def _moments(scales: Scales) -> list[Moment]:
+    return scales.discrepancy.timed.moments(list(dict.fromkeys(s.recording for s in scales.bench.segments)))
 
 
 def gains(
@@ -118,11 +119,11 @@ def gains(
     return np.array(out)
 
 
-def joined(scales: Scales, place: Sudden) -> Scales:
+def joined(scales: Scales, moment: Moment) -> Scales:
     """The same scales with this place in the discrepancy of every set."""
     made = copy.copy(scales)
     of = scales.discrepancy
-    made.discrepancy = replace(of, sudden=(*of.sudden, place))
+    made.discrepancy = replace(of, sudden=(*of.sudden, moment))
     made.families = (*scales.families, "sudden")
-    made.places = len(_places(scales))
+    made.moments = len(_moments(scales))
     return made
