@@ -6,7 +6,7 @@ nothing at all is fitted to it, and its error is that of the prediction.
 """
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -98,12 +98,26 @@ class Answered:
 
     @property
     def explained(self) -> tuple[float, float]:
-        """Share of the base's misfit beyond noise that the chosen set removes, fitted and held out."""
-        before, after = self.empty, self.chosen
-        return (
-            _share(before.chi2 - before.n, after.chi2 - after.n),
-            _share(before.held - before.n_held, after.held - after.n_held),
+        """Share of the base's misfit that the chosen set removes, fitted and held out.
+
+        Of the misfit beyond noise, each series over what nobody asks of a model: its noise, or `Criteria.negligible`
+        of its range where that is more. Over the noise alone one quiet recording would count for all.
+        """
+        bench = self.bench
+        inside, outside = (
+            (self._beyond(f, names) for f in (self.empty, self.chosen)) for names in (bench.fitted, bench.held_out)
         )
+        return _share(*inside), _share(*outside)
+
+    def _beyond(self, fit: Refit, recordings: Sequence[str]) -> float:
+        bench, total = self.bench, 0.0
+        for s in bench.segments:
+            if s.recording in recordings:
+                noise = bench.sigma[s.rows] ** 2
+                unseen = (self.exploration.criteria.negligible * np.ptp(bench.y[s.rows])) ** 2
+                missed = (bench.y - fit.prediction)[s.rows] ** 2
+                total += float(np.sum((missed - noise) / np.maximum(noise, unseen)))
+        return total
 
     def rest(self) -> dict:
         """What the chosen model leaves beyond noise: `rms`, Pa, of the discrepancy's posterior mean; shares; typical

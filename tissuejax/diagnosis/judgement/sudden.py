@@ -120,7 +120,7 @@ def gains(
 
 
 def joined(scales: Scales, moment: Moment) -> Scales:
-    """The same scales with this place in the discrepancy of every set."""
+    """The same scales with this moment in the discrepancy of every set."""
     made = copy.copy(scales)
     of = scales.discrepancy
     made.discrepancy = replace(of, sudden=(*of.sudden, moment))
