@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import equinox as eqx
 import numpy as np
 import pytest
 
@@ -16,6 +17,7 @@ from tissuejax.diagnosis.probing_series import calmed
 from tissuejax.diagnosis.probing_view import LEFT, REMAINS, ProbingView
 from tissuejax.diagnosis.refit import refit
 from tissuejax.energies.catalogue import energy
+from tissuejax.experiments import workers
 from tissuejax.recordings.recording import Sample
 
 QUICK = {"counts": (12, 12, 5), "core": 0.007, "compression": 1.5, "interval": 0.04, "step": 4e-4, "processes": 1}
@@ -193,6 +195,47 @@ def test_where_a_marker_rests_is_known_to_its_noise_over_the_frames_it_was_seen_
             assert shared == 0.0
         else:
             assert 0.1 * view.sigma[s.rows][0] < shared < 0.6 * view.sigma[s.rows][0]
+
+
+def test_a_correction_is_taken_anew_where_a_set_begins_far_from_it(bench):
+    view = ProbingView.of(bench).anchored(VALUES).rooted(VALUES)
+    near, far = {**VALUES, "energy.C10": 1.05 * VALUES["energy.C10"]}, {**VALUES, "effects.support-motion.sin.a": 2e-3}
+    far["effects.support-motion.frequency"] = 0.3
+    assert view.nearer(near).place is view.place
+    moved = view.nearer(far)
+    fine, slow, coarse = bench.runs.many([(bench.at(far), bench.fitted, k) for k in (FINE, RETIMED, COARSE)])
+    assert np.array_equal(moved.place, coarse)
+    exact = fine + LEFT * view._held_back(slow, coarse)
+    np.testing.assert_allclose(moved.natural(moved.predict(far)), exact, atol=1e-9)
+    force = next(s.rows for s in bench.segments if s.label == "force z" and s.recording == "a")
+    missed = (view.natural(view.predict(far)) - exact)[force]
+    assert np.linalg.norm(missed) > 0.005 * np.linalg.norm(exact[force])  # 0.5 % of the force, from far away
+
+
+def test_a_run_that_breaks_down_is_done_again_with_smaller_steps(pressed_too_deep, monkeypatch):
+    runs, at, real, asked = bench_of(pressed_too_deep).runs, dict(VALUES), workers.run_all, []
+
+    def breaking(jobs, processes):
+        """The first run of each pair bursts."""
+        asked.append(jobs)
+        done = real(jobs, processes)
+        if len(asked) > 1:
+            return done
+        channels = {n: np.full_like(x, np.nan) for n, x in done[0].channels.items()}
+        return [eqx.tree_at(lambda r: (r.failed, r.channels), done[0], (np.asarray(7), channels)), *done[1:]]
+
+    monkeypatch.setattr(workers, "run_all", breaking)
+    found = runs.many([(at, ("a", "b"), COARSE)])[0]
+    assert [len(jobs) for jobs in asked] == [2, 1]
+    monkeypatch.setattr(workers, "run_all", real)
+    steps = [p.settings.step for p in runs._models.values()]
+    assert min(steps) == pytest.approx(0.5 * max(steps))
+    usual = bench_of(pressed_too_deep).runs.many([(at, ("a", "b"), COARSE)])[0]
+    rows = runs.rows["a"]
+    assert np.array_equal(found[runs.rows["b"]], usual[runs.rows["b"]])
+    assert not np.array_equal(found[rows], usual[rows])
+    force = next(s.rows for s in runs.segments if s.label == "force z" and s.recording == "a")
+    assert np.linalg.norm(found[force] - usual[force]) < 0.02 * np.linalg.norm(usual[force])
 
 
 def test_a_stopped_diagnosis_finds_its_runs_again(pressed_too_deep, tmp_path, monkeypatch):

@@ -44,14 +44,6 @@ def warmed(trial: Trial, P: History, amount: float, period: float, phase: float)
     return P * (1 + amount * np.sin(2 * np.pi * t / period + phase)).reshape(-1, *([1] * (P.ndim - 1)))
 
 
-def rubbing(strain: Float[np.ndarray, "n ..."], amount: float, travel: float) -> History:
-    """Rate-independent hysteresis: a spring that slips at `amount` (Pa) after a `travel` of strain (Jenkins 1922)."""
-    q = np.zeros_like(strain)
-    for i in range(1, len(strain)):
-        q[i] = np.clip(q[i - 1] + amount / travel * (strain[i] - strain[i - 1]), -amount, amount)
-    return q
-
-
 def cured(trial: Trial, P: History, amount: float, time: float) -> History:
     """Links that form once the specimen is held: stress grows by up to `amount` from the first hold on."""
     t = np.maximum(trial.time - first_hold(trial), 0)

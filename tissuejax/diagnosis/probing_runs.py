@@ -139,7 +139,7 @@ class Runs:
         counted = {p: v for p, v in own.items() if not p.startswith("effects.") or p.split(".")[1] in on}
         return recording, kind, tuple(sorted(counted.items()))
 
-    def _predictor(self, kind: str, values: Sequence[tuple[str, float]], finer: float) -> ProbingPredictor:
+    def _predictor(self, kind: str, values: Sequence[tuple[str, float]], finer: float = 1.0) -> ProbingPredictor:
         named = {p.split(".")[1] for p, _ in values if p.startswith("effects.")}
         groups = tuple(g for i, g in enumerate(GROUPS) if i == 0 or named.intersection(g))
         lone = tuple(sorted(named.difference(*GROUPS)))
