@@ -18,9 +18,10 @@ from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.judgement.carried import carried
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence
-from tissuejax.diagnosis.judgement.explore import Effort, Exploration, explore
+from tissuejax.diagnosis.judgement.explore import Effort, Exploration
 from tissuejax.diagnosis.judgement.judge import Judgement, Kind, covering, judge
 from tissuejax.diagnosis.judgement.rest import level
+from tissuejax.diagnosis.judgement.search import explore
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.misfit import Misfit, white
 from tissuejax.diagnosis.refit import Refit, refit

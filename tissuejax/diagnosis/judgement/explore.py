@@ -14,19 +14,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tissuejax.diagnosis.bench import Bench
-from tissuejax.diagnosis.judgement.blocks import Blocks
-from tissuejax.diagnosis.judgement.coloured import coloured
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.judge import log_prior
-from tissuejax.diagnosis.judgement.scales import Scales, scaled, squared
-from tissuejax.diagnosis.judgement.sudden import begun, beside, disrupted, happened, held, joined
+from tissuejax.diagnosis.judgement.scales import Scales, squared
+from tissuejax.diagnosis.judgement.sudden import begun, beside, happened, held, joined
 from tissuejax.diagnosis.judgement.weigh import ROUNDS, Weighed, weigh
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.score import Score, complement, gain, trusted
 from tissuejax.diagnosis.starts import distinct, inside
-from tissuejax.errors import NotConverged
-from tissuejax.estimation.discrepancy import Discrepancy
 
 HOPEFUL = 8.0  # nats below the best set up to which other forms and further effects of a set are tried
 GIVEN_UP = 20.0  # nats below the best set: a set is not followed to the end of its fit
@@ -99,7 +95,11 @@ class Exploration:
 
         What is tried next follows from what describes the data best; how sure that makes of a name is another question.
         """
-        e = self.weighed[key].evidence
+        return self.log_worth(self.weighed[key])
+
+    def log_worth(self, w: Weighed) -> float:
+        """The same of a set that need not be remembered."""
+        e = w.evidence
         if e.void or not math.isfinite(e.log_evidence):
             return -math.inf
         return e.log_evidence + log_prior(e, self.forms, self.criteria)
@@ -338,62 +338,3 @@ class Exploration:
         for k in parent.evidence.keys if len(key) > 1 or self.bench.costly else ():
             order = tuple(x for x in parent.evidence.keys if x != k)
             self.weigh(order, [parent.refit.values], v=parent.v, bench=parent.bench)
-
-
-def explore(
-    bench: Bench,
-    cut: Blocks,
-    of: Discrepancy,
-    criteria: Criteria | None = None,
-    effort: Effort | None = None,
-    report: Callable[[str], None] | None = None,
-) -> Exploration:
-    """Weigh the base model and the sets that are worth it; see the module's text.
-
-    Args:
-        bench: with all recordings fitted.
-        cut: block means of what was measured; of: the discrepancy that any model leaves of them.
-
-    Raises:
-        NotConverged: the base model can't be fitted at all.
-    """
-    criteria, effort = criteria or Criteria(), effort or Effort()
-    start = {p: bench.start[p] for p in bench.base}
-    if report:
-        report("fitting the base model")
-    bench = bench.anchored(start)
-    scales = scaled(bench, cut, of, bench.y, start, criteria)
-    base = weigh(scales, (), start, criteria)
-    if not np.isfinite(base.evidence.log_evidence):
-        raise NotConverged(
-            f"the base model can't be fitted to {', '.join(bench.fitted)}: its prediction is not finite there from any "
-            "parameters tried; name another --energy, or leave out the samples of largest strain"
-        )
-    if (noise := coloured(scales.blocked, bench, cut, base.refit.prediction)) is not None:
-        scales.blocked = noise
-        base = weigh(scales, (), base.refit.values, criteria)
-    scales, base = disrupted(scales, base, criteria)
-    scales.values, scales.reference = base.refit.values, scales.cut.mean(base.refit.prediction)
-    scales.bench = (base.bench or bench).anchored(base.refit.values).rooted(base.refit.values)
-    scales.bench.free = bench.free  # without the priors of a set
-    e = Exploration(scales.bench, criteria, effort, scales, report or (lambda _: None), {frozenset(): base})
-    e.extend([frozenset()], effort.singles, effort.singles)
-    for key in e.near(1)[: effort.reshaped[0]]:
-        e.reshape(key)
-    e.settle(1)
-    if bench.costly:  # one start was all that the base had
-        e.leave_out(e.best)
-    for size, most in ((1, effort.pairs), (2, effort.triples)):
-        parents = e.parents(size)[: effort.parents[size - 1]]
-        if size >= effort.most or not parents or (size == 2 and len(e.best) < 2 and not e.strange):
-            break  # a third effect is sought where a second one has come in, or much is left
-        if effort.stepwise and len(e.best) < size:
-            break
-        e.extend(parents, most, max(most // len(parents), 1) + 2)
-        for key in e.near(size + 1)[: effort.reshaped[size]]:
-            e.reshape(key)
-        e.settle(size + 1)
-        e.leave_out(e.best)
-        e.settle(size)
-    e.look_again()
-    return e

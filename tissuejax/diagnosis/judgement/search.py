@@ -1,0 +1,91 @@
+"""The course of a search: the base, single effects, pairs and triples, and what may have happened at once.
+
+What happened at once comes in before the pairs where it describes the recordings better, beside the base, than any
+single effect does, and at the end beside the best sets.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tissuejax.diagnosis.bench import Bench
+from tissuejax.diagnosis.judgement.blocks import Blocks
+from tissuejax.diagnosis.judgement.coloured import coloured
+from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.explore import Effort, Exploration
+from tissuejax.diagnosis.judgement.scales import Scales, scaled
+from tissuejax.diagnosis.judgement.sudden import disrupted
+from tissuejax.diagnosis.judgement.weigh import Weighed, weigh
+from tissuejax.errors import NotConverged
+from tissuejax.estimation.discrepancy import Discrepancy
+
+Report = Callable[[str], None] | None
+
+
+def explore(
+    bench: Bench,
+    cut: Blocks,
+    of: Discrepancy,
+    criteria: Criteria | None = None,
+    effort: Effort | None = None,
+    report: Report = None,
+) -> Exploration:
+    """Weigh the base model and the sets that are worth it; see the module's text.
+
+    Args:
+        bench: with all recordings fitted.
+        cut: block means of what was measured; of: the discrepancy that any model leaves of them.
+
+    Raises:
+        NotConverged: the base model can't be fitted at all.
+    """
+    criteria, effort = criteria or Criteria(), effort or Effort()
+    start = {p: bench.start[p] for p in bench.base}
+    if report:
+        report("fitting the base model")
+    bench = bench.anchored(start)
+    scales = scaled(bench, cut, of, bench.y, start, criteria)
+    base = weigh(scales, (), start, criteria)
+    if not np.isfinite(base.evidence.log_evidence):
+        raise NotConverged(
+            f"the base model can't be fitted to {', '.join(bench.fitted)}: its prediction is not finite there from any "
+            "parameters tried; name another --energy, or leave out the samples of largest strain"
+        )
+    if (noise := coloured(scales.blocked, bench, cut, base.refit.prediction)) is not None:
+        scales.blocked = noise
+        base = weigh(scales, (), base.refit.values, criteria)
+    e = alone(bench, scales, base, criteria, effort, report)
+    scales, disturbed = disrupted(scales, base, criteria)
+    if e.log_worth(disturbed) > e.worth(e.best):  # better than any single effect: all of them beside what happened
+        e = alone(bench, scales, disturbed, criteria, effort, report)
+    if bench.costly:  # one start was all that the base had
+        e.leave_out(e.best)
+    for size, most in ((1, effort.pairs), (2, effort.triples)):
+        parents = e.parents(size)[: effort.parents[size - 1]]
+        if size >= effort.most or not parents or (size == 2 and len(e.best) < 2 and not e.strange):
+            break  # a third effect is sought where a second one has come in, or much is left
+        if effort.stepwise and len(e.best) < size:
+            break
+        e.extend(parents, most, max(most // len(parents), 1) + 2)
+        for key in e.near(size + 1)[: effort.reshaped[size]]:
+            e.reshape(key)
+        e.settle(size + 1)
+        e.leave_out(e.best)
+        e.settle(size)
+    e.look_again()
+    return e
+
+
+def alone(
+    bench: Bench, scales: Scales, base: Weighed, criteria: Criteria, effort: Effort, report: Report = None
+) -> Exploration:
+    """An exploration with the base and all single effects weighed."""
+    scales.values, scales.reference = base.refit.values, scales.cut.mean(base.refit.prediction)
+    scales.bench = (base.bench or bench).anchored(base.refit.values).rooted(base.refit.values)
+    scales.bench.free = bench.free  # without the priors of a set
+    e = Exploration(scales.bench, criteria, effort, scales, report or (lambda _: None), {frozenset(): base})
+    e.extend([frozenset()], effort.singles, effort.singles)
+    for key in e.near(1)[: effort.reshaped[0]]:
+        e.reshape(key)
+    e.settle(1)
+    return e
