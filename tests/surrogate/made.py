@@ -47,7 +47,7 @@ def field(f, matrices, spacing, origin):
     return table(origin, spacing, values, matrices)
 
 
-def formula(g=(), tau=(), friction=0.0, strength=0.0) -> Surrogate:
+def formula(g=(), tau=(), friction=0.0, strength=0.0, modulus=0.0) -> Surrogate:
     """A surrogate of `vertical`, with one stress mode that grows with depth where g is given."""
     plan = [through(n) for n in BOX.counts]
     origin, spacing = np.append(BOX.low, 0), np.append(BOX.spacing, 1 / BOX.depths)
@@ -62,7 +62,7 @@ def formula(g=(), tau=(), friction=0.0, strength=0.0) -> Surrogate:
     surface = Surface((1, 1, 0), shape, np.ones((2, 4, 3)), field(lambda x, y: 1 + 0 * x, plan, BOX.spacing, BOX.low),
         rest[None], field(lambda x, y: (0 * x, 1 + 0 * x, 0 * x, 1 + 0 * x), plan, BOX.spacing, BOX.low),
     )  # fmt: skip
-    rub = drag.Rub(*(np.asarray(v) for v in (friction, 0.0, strength, 2e-4)), np.array(SLIP))
+    rub = drag.Rub(*(np.asarray(v) for v in (friction, 0.0, strength, 2e-4)), np.array(SLIP), np.asarray(modulus))
     rig = Rig(np.zeros(3), np.asarray(0.0), np.asarray(0.0))
     return Surrogate(
         BOX.low, BOX.high, np.asarray(DEPTH), np.asarray(RADIUS), touch, law, surface, memory, rub, rig, np.asarray(1.0)

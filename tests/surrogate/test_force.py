@@ -130,6 +130,22 @@ def test_adhesion_pulls_on_the_way_out_only_and_ends():
     assert not force[d < -5.5 * 2e-4].any()
 
 
+@pytest.mark.parametrize("share", [0.75001, 0.8, 0.875, 0.95, 0.99999])
+def test_the_neck_of_soft_tissue_takes_its_share_of_the_pull(share):
+    """The modulus is chosen for the share by the formula solved the other way round; Python, JAX and limits agree."""
+    power = (1 - 8 * (share - 7 / 8)) / (1 + 8 * (share - 7 / 8))  # 4.04 l^1.4
+    lam, sigma, work = (power / 4.04) ** (1 / 1.4), 300.0, np.e * 300.0 * 2e-4
+    modulus = 0.75 * np.sqrt(made.RADIUS / (np.pi * work * (lam / (2 * sigma)) ** 3))
+    d = np.concatenate([np.linspace(-2e-4, 2e-3, 200), np.linspace(2e-3, -2e-3, 400)])
+    path = np.stack([0 * d, 0 * d, made.height(0.0, 0.0) - d], 1)
+    t, soft = np.linspace(0, 2, 600), made.formula(strength=sigma, modulus=modulus)
+    plain, rigid = (asked(s, t, path)[:, 2] for s in (made.formula(), made.formula(strength=sigma)))
+    got = asked(soft, t, path)
+    assert got[:, 2] - plain == pytest.approx(share * (rigid - plain), abs=1e-9)
+    theirs = eqx.filter_jit(lambda s, t, p: s.respond(t, p))(soft, jnp.asarray(t), jnp.asarray(path))
+    assert np.allclose(got, theirs, atol=1e-10)
+
+
 def test_friction_reaches_the_coulomb_limit_and_turns_with_the_motion():
     s = made.formula(friction=0.3)
     t = np.linspace(0, 4, 801)

@@ -62,7 +62,8 @@ def of_surrogate(made: Precomputed, wrong: Sequence[str], replay: Mapping | None
         "touch": plain_table(s.touch), "law": plain_table(s.law), "coefficients": plain_table(s.surface.coefficients),
         "modes": coded(s.surface.modes), "settled": coded(s.surface.settled),
         "settled_coefficients": plain_table(s.surface.settled_coefficients), "memory": memory,
-        "rub": {name: float(getattr(s.rub, name)) for name in ("friction", "give", "strength", "reach")}
+        "rub": {name: float(getattr(s.rub, name)) for name in ("friction", "give", "reach")}
+        | {"strength": s.strength()}
         | {"slip": np.asarray(s.rub.slip, float).tolist()},
         **skins(rest, made.cells, float(middle[1])),
         **({"replay": dict(replay)} if replay else {}),

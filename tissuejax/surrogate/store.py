@@ -16,7 +16,7 @@ from tissuejax.surrogate.drag import Rub
 from tissuejax.surrogate.precompute import Precomputed
 from tissuejax.surrogate.surrogate import Memory, Rig, Surface, Surrogate
 
-FORMAT, VERSION = "tissuejax surrogate", 2
+FORMAT, VERSION = "tissuejax surrogate", 3
 
 
 def write(made: Precomputed, path: str | Path) -> Path:

@@ -155,7 +155,9 @@ class Surrogate(eqx.Module):
         share = jnp.where(depth > 0, jnp.minimum(state.share, self.within(p)), 1.0)
         # Hertz: the slope of the force is 1.5 force / depth; friction needs no better
         stiffness = 1.5 * elastic[2] / jnp.clip(depth, 1e-9, self.depth)
-        extra, grip = drag.tick(self.rub, state.grip, p[:2], depth, force[2], stiffness, self.radius, self.depth)
+        extra, grip = drag.tick(
+            self.rub, state.grip, p[:2], depth, force[2], stiffness, self.radius, self.depth, self.factor
+        )
         grip = grip._replace(deepest=jnp.where(share > 0, grip.deepest, -1.0))
         return State(gone, now, grip, share), jnp.minimum(share, self.within(p)) * (force + extra)
 
@@ -189,6 +191,10 @@ class Surrogate(eqx.Module):
             return (1 - v) * low + v * ((1 - u) * moved[i, j + 1] + u * moved[i + 1, j + 1])
 
         return jax.lax.map(at, path)
+
+    def strength(self) -> float:
+        """Of adhesion, Pa, that a surface which stays where it is would need to pull as hard; on the host."""
+        return float(self.rub.strength) * float(drag.neck(self.rub, self.radius, self.factor))
 
     def put(self, changes: Mapping[str, Array]) -> "Surrogate":
         """A copy with leaves replaced by dotted path, e.g. {"factor": 1.1, "memory.g": g, "rub.friction": 0.2}."""

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 import equinox as eqx
+import jax
 import numpy as np
 from jaxtyping import Float
 
@@ -14,6 +15,7 @@ from tissuejax.surrogate.places import Box, first_contact
 from tissuejax.surrogate.ramp import Matter, Ramp, scene_at
 from tissuejax.surrogate.site_mesh import Grid, lines, nodes
 from tissuejax.surrogate.surrogate import Memory, Rig, Surface, Surrogate
+from tissuejax.tled.scene import Tissue
 
 SHAPES, SHAPE_ERROR = 40, 2e-3  # modes of displacement at most, and share of the displacements left out
 SETTLED = 1e-5  # share left out of the nodes' places
@@ -99,12 +101,23 @@ def slip_fitted(q: Float[np.ndarray, " k"], slips: Float[np.ndarray, "n k"]) -> 
 
 def contact_extras(matter: Matter, grid: Grid, place: Float[np.ndarray, "2"]) -> tuple[drag.Rub, Rig, float]:
     """Friction, adhesion, the rig's part, and the ball's true radius, from the model's own scene."""
-    probe = full_scene(matter, grid, place).probe
+    scene = full_scene(matter, grid, place)
+    probe, modulus = scene.probe, reduced_modulus(scene.tissue)
     number = lambda x: np.asarray(0.0 if x is None else float(x))  # noqa: E731
-    rub = drag.Rub(number(probe.friction), number(probe.give), number(probe.adhesion), number(probe.reach), np.zeros(3))
+    rub = drag.Rub(
+        number(probe.friction), number(probe.give), number(probe.adhesion), number(probe.reach), np.zeros(3),
+        np.asarray(modulus),
+    )  # fmt: skip
     offset = np.zeros(3) if probe.offset is None else np.asarray(probe.offset, float)
     rig = Rig(offset, np.asarray(float(probe.time[0])), number(probe.compliance))
     return rub, rig, float(probe.shape.radius)
+
+
+def reduced_modulus(tissue: Tissue) -> float:
+    """E / (1 - nu^2) of the tissue at rest before it relaxes, Pa: 4 mu (3 K + mu) / (3 K + 4 mu)."""
+    mu = float(tissue.energy.initial_shear_modulus(tissue.energy_values))
+    bulk = jax.grad(jax.grad(lambda J: tissue.volumetric.energy(tissue.volumetric_values, J)))(1.0)
+    return 4 * mu * (3 * float(bulk) + mu) / (3 * float(bulk) + 4 * mu)
 
 
 def full_scene(matter: Matter, grid: Grid, place):

@@ -78,8 +78,8 @@ class Asker:
         self.g, self.tau = (
             (np.zeros(0),) * 2 if s.memory is None else (np.asarray(s.memory.g), np.asarray(s.memory.tau))
         )
-        numbers = (float(v) for v in (s.rub.friction, s.rub.give, s.rub.strength, s.rub.reach))
-        self.rub = type(s.rub)(*numbers, np.asarray(s.rub.slip, float))
+        numbers = (float(v) for v in (s.rub.friction, s.rub.give, s.strength(), s.rub.reach))
+        self.rub = type(s.rub)(*numbers, np.asarray(s.rub.slip, float), 0.0)
         self.rubs = float(self.rub.strength) > 0 or float(self.rub.friction) > 0
         self.rest()
 

@@ -3,7 +3,8 @@
 Layout: "TJFORCE2"; int32 number of Prony terms, int32 zero; float64 low x, low y, high x, high y, depth, radius,
 factor, friction, give, strength, reach, slip[3]; float64 g[8], tau[8]; then the tables touch (over x, y), law, and with
 a memory stress and strain (over x, y, s): int32 counts of coefficients along x, y, s, int32 values M, float64
-origin[3], 1 / spacing[3], coefficients with M fastest.
+origin[3], 1 / spacing[3], coefficients with M fastest. `strength` is that of
+`Surrogate.strength`.
 """
 
 from pathlib import Path
@@ -31,7 +32,7 @@ def flat(surrogate: Surrogate) -> bytes:
         raise InputError(f"{len(g)} relaxation terms: a force file holds {TERMS}; precompute a model with fewer")
     numbers = [
         *np.asarray(s.low), *np.asarray(s.high), s.depth, s.radius, s.factor,
-        s.rub.friction, s.rub.give, s.rub.strength, max(float(s.rub.reach), 1e-9), *np.asarray(s.rub.slip),
+        s.rub.friction, s.rub.give, s.strength(), max(float(s.rub.reach), 1e-9), *np.asarray(s.rub.slip),
     ]  # fmt: skip
     parts = [
         MAGIC,
