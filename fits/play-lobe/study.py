@@ -296,7 +296,7 @@ def draw(found: dict) -> Figure:
             )
             top.axvline(a, color="#e0e3e8", linewidth=0.8, zorder=0)
         low.set_xlabel("time (s)", fontsize=8)
-    axes[0, 0].legend(fontsize=7, loc="center right")
+    axes[0, 0].legend(fontsize=7, loc="lower center")
     return figure
 
 

@@ -10,6 +10,7 @@ from tissuejax.errors import InputError
 from tissuejax.surrogate import ramp as ramps
 from tissuejax.surrogate import store
 from tissuejax.surrogate.live.ask import Asker
+from tissuejax.surrogate.memory import narrow
 from tissuejax.surrogate.places import Box, checked, first_contact, whole_top
 from tissuejax.surrogate.precompute import precompute
 from tissuejax.surrogate.ramp import scene_at, slip
@@ -152,6 +153,13 @@ def test_what_cannot_be_tabulated_is_refused_by_its_name(name, values):
     with pytest.raises(InputError, match=f"effect {name} can't be tabulated.*--direct"):
         refuse(made.matter(effect, **amounts), made.SMALL, [0.0, 0.0])
     refuse(made.matter(effect), made.SMALL, [0.0, 0.0])  # at its neutral value it is no matter
+
+
+def test_a_box_too_wide_for_the_memory_of_stress_is_refused():
+    wide = Box(np.array([-0.02, -0.01]), np.array([0.02, 0.01]), 5e-3, (3, 3))
+    with pytest.raises(InputError, match=r"40 x 20 mm with relaxation.* 36 mm at most.*--reach 18"):
+        narrow(wide)
+    narrow(wide._replace(low=np.array([-0.016, -0.01])))
 
 
 def test_a_failed_site_says_place_and_depth(monkeypatch):

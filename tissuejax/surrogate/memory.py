@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import RegularGridInterpolator
 
+from tissuejax.errors import InputError
 from tissuejax.mesh.columns import Lobe
 from tissuejax.mesh.quality import cell_volumes
 from tissuejax.surrogate.cardinal import design, through
@@ -25,6 +26,7 @@ TOLERANCE, MOST = 0.01, 64
 DOUBLE = np.array([1.0, 1, 1, 2, 2, 2])  # off-diagonal components count twice in S : E
 POINTS = 26  # material cells along an axis at most
 FINEST = 2e-3  # m between the places of the memory's tables
+WIDEST = 0.036  # m: `MOST` modes and `POINTS` cells were tried up to 24 mm; beyond this cells are wider than a contact
 
 
 class Material(NamedTuple):
@@ -32,6 +34,20 @@ class Material(NamedTuple):
 
     axes: tuple[Float[np.ndarray, " a"], ...]
     volume: Float[np.ndarray, " n"]
+
+
+def narrow(box: Box) -> None:
+    """Nothing, if the memory of one region holds the box.
+
+    Raises:
+        InputError: it is too wide.
+    """
+    wide = box.high - box.low
+    if wide.max() > WIDEST + 1e-9:
+        raise InputError(
+            f"a box of {1e3 * wide[0]:.0f} x {1e3 * wide[1]:.0f} mm with relaxation: the memory of stress holds "
+            f"{1e3 * WIDEST:.0f} mm at most: take --reach {500 * WIDEST:.0f} or less, several files, or no relaxation"
+        )
 
 
 def material(lobe: Lobe, box: Box, grid: Grid) -> Material:

@@ -14,6 +14,7 @@ from tissuejax.experiments import workers
 from tissuejax.progress import Progress, Silent
 from tissuejax.storage import plain, write_npz
 from tissuejax.surrogate import error
+from tissuejax.surrogate.memory import narrow
 from tissuejax.surrogate.places import Box, checked, first_contact
 from tissuejax.surrogate.ramp import Matter, Ramp, ramp
 from tissuejax.surrogate.refusals import refuse
@@ -64,6 +65,7 @@ def precompute(
     prony = None
     if true.tissue.prony is not None and float(np.abs(true.tissue.prony.g).max()) > 0:
         prony = (np.asarray(true.tissue.prony.g), np.asarray(true.tissue.prony.tau))
+        narrow(box)
     contact = first_contact(matter.lobe, box, float(true.probe.shape.radius))
     run = _Sites(matter, grid, contact, keep, processes, progress, prony is not None)
     checks = box.depth * np.asarray(LEVELS)
