@@ -74,7 +74,12 @@ command is given again. Softening, a moving or sliding base and escaping fluid c
         try:
             made = precompute(matter, box, grid, wanted, keep, for_terminal(), given.processes)
         except NotConverged as fault:
-            raise InputError(f"{fault}; finished sites are kept in {keep}, for a command like this one") from fault
+            kept = (
+                f"finished sites are kept in {keep}, for a command like this one"
+                if keep.is_dir()
+                else "no site is done"
+            )
+            raise InputError(f"{fault}; {kept}") from fault
         made.record["sample"] = name
         store.write(made, out)
         shutil.rmtree(keep, ignore_errors=True)
