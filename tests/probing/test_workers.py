@@ -1,5 +1,9 @@
 """A second process gives what this one gives, and its errors come back."""
 
+import signal
+import threading
+import time
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -21,6 +25,21 @@ def test_a_failing_job_raises_here():
         workers.run_all([(_fails, 0, np.zeros(2))] * 3, 2)
 
 
+def test_a_worker_leaves_ctrl_c_to_its_caller_and_ends_with_it_in_the_middle_of_a_job():
+    worker = workers.Worker()
+    assert worker.ask((_square, 3, np.ones(2)), programs.run).tolist() == [3.0, 3.0]
+    worker.process.send_signal(signal.SIGINT)
+    assert worker.ask((_square, 2, np.ones(2)), programs.run).tolist() == [2.0, 2.0]
+    told = []
+    asking = threading.Thread(target=_asked, args=(worker, told), daemon=True)
+    asking.start()
+    time.sleep(0.5)
+    worker.close()
+    assert worker.process.poll() is not None
+    asking.join(timeout=10)
+    assert told == ["lost"]  # the job of a minute was not waited for
+
+
 def test_programs_are_compiled_ahead_on_both_sides():
     x = [np.arange(6.0), np.arange(7.0)]
     jobs = [(_square, 5, a) for a in x]
@@ -37,6 +56,17 @@ def test_inside_a_transformation_a_program_is_a_function():
 
 def _square(static, x):
     return static * x**2
+
+
+def _slow(job):
+    time.sleep(60)
+
+
+def _asked(worker, told):
+    try:
+        told.append(worker.ask((0,), _slow))
+    except (EOFError, OSError):
+        told.append("lost")
 
 
 def _fails(static, x):

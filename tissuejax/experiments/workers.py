@@ -8,11 +8,13 @@ compiled programs in the disk cache. Its main module is this one, so the caller'
 import atexit
 import os
 import pickle
+import signal
 import subprocess
 import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,7 @@ from tissuejax.cache import source
 from tissuejax.experiments import programs
 
 CODE = "TISSUEJAX_CODE"  # hash of the code that asks: a worker with another one does nothing for it
+PATIENT = 2.0  # s, that a worker may take to end by itself
 Job = tuple[Any, ...]  # function, static, arguments: as `programs.run` takes them
 
 
@@ -58,10 +61,15 @@ class Worker:
         return answer
 
     def close(self) -> None:
-        """End the process."""
+        """End the process, also in the middle of a job (a compilation can't be interrupted)."""
         if self.process.poll() is None:
-            self.process.stdin.close()
-            self.process.wait(timeout=10)
+            with suppress(BrokenPipeError):
+                self.process.stdin.close()
+            try:
+                self.process.wait(timeout=PATIENT)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+                self.process.wait()
 
 
 _workers: list[Worker] = []
@@ -116,12 +124,16 @@ def run_all(jobs: Sequence[Job], processes: int, do: Callable = programs.run) ->
 
 
 def serve_pipe() -> None:
-    """The worker's side: jobs from standard input, results to standard output; prints go to the error stream."""
+    """The worker's side: jobs from standard input, results to standard output; prints go to the error stream.
+
+    Ctrl-C reaches it too, and is the caller's business: what ends a worker is the end of its input.
+    """
     from tissuejax.cache.programs import keep_programs
 
     if os.environ.get(CODE, source.LOADED) != source.LOADED:
         sys.exit("tissuejax was changed since the calculation began: its simulations go on in one process")
     keep_programs()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     while True:
