@@ -21,6 +21,7 @@ from tissuejax.commands.problem_file import expanded
 from tissuejax.commands.sentences import Parser, sentence
 from tissuejax.errors import InputError, TissueError
 from tissuejax.families import members
+from tissuejax.interrupt import CODE, stop, watched
 
 TEACHES = """
 tissuejax identifies the mechanics of soft tissue from recordings, by gradients through the model.
@@ -119,10 +120,12 @@ def _command(entry: Listed) -> Command:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code."""
-    argv = list(sys.argv[1:] if argv is None else argv)
+    """Run one command; returns the exit code (where Ctrl-C ends it in a process of its own, that ends at once)."""
+    own, argv = argv is None, list(sys.argv[1:] if argv is None else argv)
     known = {entry.name: entry for entry in listed()}
     name = next((word for word in argv if not word.startswith("-")), "")
+    if own:
+        watched(name)
     try:
         argv = expanded(argv)
         given = parser(name).parse_args(argv)
@@ -138,8 +141,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         return _refused(name, InputError(sentence(error)), "--json" in argv)
     except KeyboardInterrupt:
+        if own:
+            stop(name)
         print(f"tissuejax {name}: stopped", file=sys.stderr)
-        return 130
+        return CODE
     from tissuejax.storage import plain
 
     try:

@@ -39,6 +39,7 @@ FLOORS = [
     {"play"},
     {"verbs"},
     {"commands"},
+    {"interrupt"},
     {"cli"},
     {"__main__"},
 ]

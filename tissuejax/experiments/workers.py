@@ -24,7 +24,7 @@ from tissuejax.cache import source
 from tissuejax.experiments import programs
 
 CODE = "TISSUEJAX_CODE"  # hash of the code that asks: a worker with another one does nothing for it
-PATIENT = 2.0  # s, that a worker may take to end by itself
+PATIENT = 1.0  # s, that a worker may take to end by itself
 Job = tuple[Any, ...]  # function, static, arguments: as `programs.run` takes them
 
 
@@ -73,6 +73,12 @@ class Worker:
 
 
 _workers: list[Worker] = []
+
+
+def close_all() -> None:
+    """End all helper processes."""
+    for worker in _workers:
+        worker.close()
 
 
 def run_all(jobs: Sequence[Job], processes: int, do: Callable = programs.run) -> list:
