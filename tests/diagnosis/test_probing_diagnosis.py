@@ -7,7 +7,8 @@ from tests.probing.bench import VALUES, measured, recording, sample
 from tissuejax.diagnosis.diagnose import PROBING
 from tissuejax.diagnosis.judgement.answer import Answered, answer
 from tissuejax.diagnosis.probing import ProbingBench
-from tissuejax.diagnosis.probing_view import ProbingView, probing_blocks, probing_discrepancy
+from tissuejax.diagnosis.probing_discrepancy import probing_discrepancy
+from tissuejax.diagnosis.probing_view import ProbingView, probing_blocks
 from tissuejax.energies.catalogue import energy
 from tissuejax.recordings.recording import Sample
 

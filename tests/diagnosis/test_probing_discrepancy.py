@@ -9,7 +9,8 @@ from tissuejax.diagnosis.bench import Segment
 from tissuejax.diagnosis.judgement.blocks import blocks
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, amplitudes
-from tissuejax.diagnosis.probing_view import BLOCKS, probing_discrepancy
+from tissuejax.diagnosis.probing_discrepancy import probing_discrepancy
+from tissuejax.diagnosis.probing_view import BLOCKS
 
 NOISE = {"force": 0.007, "markers": 0.02}  # of the largest value, as in careful recordings
 
@@ -40,7 +41,9 @@ def left(presses, added, seed=0):
     edges = np.flatnonzero(np.diff(cut.owner, prepend=-1))
     rows = tuple(slice(int(a), int(b)) for a, b in zip(edges, [*edges[1:], len(cut.starts)], strict=True))
     noise = view.sigma * np.random.default_rng(seed).standard_normal(len(truth))
-    linear = Linear(cut.mean(added + noise), cut.mean(truth)[:, None], np.zeros(1), np.zeros(1))
+    force = np.array([view.segments[k].channel == "force" for k in cut.owner])
+    modulus = cut.mean(truth) * force  # a factor common to the moduli: of the forces, and no marker feels it
+    linear = Linear(cut.mean(added + noise), modulus[:, None], np.zeros(1), np.zeros(1))
     widths = np.array([Criteria().shares[p.family] for p in parts])
     priors = Widths(widths, np.zeros(len(parts)))
     v, _ = amplitudes(linear, parts, priors, Blocked(rows, cut.spread(view.sigma)), widths**2)
@@ -78,3 +81,16 @@ def test_a_misplaced_marker_is_its_own_and_no_law_of_the_force(presses):
     assert found["marker"] > 0.02
     force = ("law", "fine law", "gain", "own law", "quick", "slow", "lasting")
     assert max(found[k] for k in force) < 0.006
+
+
+def test_parts_that_scale_with_a_force_hold_no_constant_share_of_it(presses):
+    view, truth = presses
+    cut = blocks(view, BLOCKS)
+    force = np.array([view.segments[k].channel == "force" for k in cut.owner])
+    alike = np.where(force, cut.mean(truth) / cut.spread(view.sigma) ** 2, 0.0)
+    size = np.linalg.norm(alike)
+    scaling = [p for p in left(presses, 0 * truth)[1] if p.family in ("law", "gain", "onset")]
+    assert {p.name for p in scaling} >= {"law", "fine law", "gain", "own law", "onset", "law of markers"}
+    for part in scaling:
+        if part.name != "crosstalk":
+            assert np.max(np.abs(alike @ part.factor)) < 1e-9 * size * np.linalg.norm(part.factor)

@@ -23,8 +23,9 @@ from tissuejax.diagnosis.next_experiment import proposals, settling
 from tissuejax.diagnosis.next_probing import probing_proposals
 from tissuejax.diagnosis.offered import HYSTERESIS, SCATTER, offered, paced
 from tissuejax.diagnosis.probing import ProbingBench
+from tissuejax.diagnosis.probing_discrepancy import probing_discrepancy
 from tissuejax.diagnosis.probing_map import stiffness_maps
-from tissuejax.diagnosis.probing_view import ProbingView, probing_blocks, probing_discrepancy
+from tissuejax.diagnosis.probing_view import ProbingView, probing_blocks
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.effects.catalogue import effects as all_effects
 from tissuejax.energies.catalogue import energy as named_energy
