@@ -1,5 +1,6 @@
 """Sets whose model does nothing, or can't be predicted, are void: no verdict rests on them and nothing stops."""
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -130,3 +131,25 @@ def test_the_density_is_that_of_the_parameters_reached(bench, iterations):
             covariance += v * part.factor @ part.factor.T
     expected = multivariate_normal.logpdf(left, cov=covariance, allow_singular=True)
     assert found.evidence.fit == pytest.approx(expected, abs=0.05)
+
+
+class Twofold(Fibred):
+    """A cheap spring whose fine simulation breaks down where it is stiffer than `LAST`, as laws that soften do."""
+
+    last, broken = 12.0, False
+
+    def anchored(self, values):
+        made = copy.copy(self)
+        made.broken = values["b"] > self.last
+        return made
+
+    def predict(self, values, recordings=None):
+        return super().predict(values) * (np.nan if self.broken else 1.0)
+
+
+def test_where_the_fine_simulation_breaks_down_a_fit_stays_short_of_that(bench):
+    bench.__class__ = Twofold
+    _, base = scales(bench)
+    assert np.isfinite(base.evidence.log_evidence)
+    assert 6.0 < base.refit.values["b"] <= 12.0  # of 20 that describe the recordings best
+    assert np.all(np.isfinite(base.refit.prediction))

@@ -34,6 +34,7 @@ from tissuejax.diagnosis.refit import Descent, Refit, refit
 from tissuejax.estimation.discrepancy import Part
 
 ROUNDS = 4  # of fit and amplitudes in turn
+SHORTENED = 5  # halvings of a step to where the fine simulation fails
 SETTLED = 0.1  # nats: a round that gains less is the last
 FELT = 1e-6  # of the peak: what is no rounding, by its slope
 WILD = 1e3  # of the peak: a prediction beyond that has no density, were it of one sample alone
@@ -133,6 +134,10 @@ def weigh(
         fit = refit(bench, misfit, keys, at, iterations=iterations, tolerance=tolerance, errors=False, seed=seed)
         if not np.isfinite(fit.chi2):
             break
+        if anchor:
+            bench, fit = _anchored(bench, fit, at)
+        if not np.max(np.abs(fit.prediction)) < WILD * scales.peak:
+            break  # shares of it would cover all that was measured
         descent = Descent(bench, misfit, tuple(fit.values), names, {})
         x = descent.point(fit.values)
         span = np.minimum(
@@ -143,11 +148,6 @@ def weigh(
         jac = raw * np.where(descent.log, [fit.values[p] for p in descent.paths], 1.0)
         if not np.isfinite(squared(jac / scales.blocked.sigma[:, None])):
             break  # a prediction without a slope, or with one beyond all numbers: no density is to be had there
-        near = bench.anchored(fit.values) if anchor else bench
-        if near is not bench:
-            bench, fit = near, replace(fit, prediction=near.predict(fit.values))
-        if not np.max(np.abs(fit.prediction)) < WILD * scales.peak:
-            break  # shares of it would cover all that was measured
         residual, parts = y - scales.cut.mean(fit.prediction), scales.about(fit.prediction, bench)
         prior = [priors.get(p) for p in descent.paths]
         weak = np.array([0.0 if p is None else p[1] ** -2 for p in prior])
@@ -185,6 +185,22 @@ def weigh(
     if best is None:
         return _impossible(scales, keys)
     return replace(_described(scales, keys, best, criteria), settled=anchor)
+
+
+def _anchored(bench: Bench, fit: Refit, start: Mapping[str, float]) -> tuple[Bench, Refit]:
+    """The bench corrected where a fit came to rest, and the fit; nearer to its start where the fine simulation fails.
+
+    A law that softens may be stable on a coarse mesh, where strains are averaged, and not on a fine one.
+    """
+    first = fit
+    for _ in range(SHORTENED):
+        near = bench.anchored(fit.values)
+        if near is not bench or fit is not first:
+            fit = replace(fit, prediction=near.predict(fit.values))
+        if np.all(np.isfinite(fit.prediction)):
+            return near, fit
+        fit = replace(fit, values={p: 0.5 * (start.get(p, v) + v) for p, v in fit.values.items()})
+    return bench, fit  # its prediction is not finite, and ends the search
 
 
 def _amplitudes(linear, parts, widths: Widths, blocked, v, anew: bool, both: bool) -> tuple[np.ndarray, Marginal]:
