@@ -17,10 +17,10 @@ from tissuejax.estimation.discrepancy import BAND, Part, Series, discrepancy, lo
 FORMS = {"relaxation": 2, "slack": 1, "drift": 3}
 
 
-def weighed(names, log_evidence, rest=1e-8, void=False):
+def weighed(names, log_evidence, rest=1e-8, void=False, chi2=1e9):
     keys = tuple(names)
     numbers = {"fit": 0.0, "parameters": 0.0, "discrepancy": 0.0, "amplitudes": {}, "k": 2, "at_bound": ()}
-    more = {"chi2": 100.0, "n": 100, "kurtosis": 0.0, "explained": 0.5, "rest": (rest, 1e-2 * rest)}
+    more = {"chi2": chi2, "n": 100, "kurtosis": 0.0, "explained": 0.5, "rest": (rest, 1e-2 * rest)}
     return SetEvidence(keys, keys, log_evidence, void=void, **numbers, **more)
 
 
@@ -54,6 +54,14 @@ def test_more_data_of_a_model_that_is_nearly_right_count_less_each_but_never_les
     assert powers[0] == pytest.approx(1.0, abs=0.01)
     assert np.all(np.diff(powers) <= 0)
     assert np.all(np.diff(n * powers) > 0)
+
+
+@pytest.mark.parametrize(("chi2", "power"), [(80.0, 1.0), (100.0, 1.0), (200.0, 0.8), (1e9, 200 / 300)])
+def test_all_of_the_evidence_counts_where_the_likeliest_set_leaves_noise(chi2, power):
+    """Of 100 block means: none, half or all of what is left is a rest; the base's own does not matter."""
+    j = judge(evidence(weighed([], 0.0, chi2=1e5), weighed(["slack"], 4.0, chi2=chi2)))
+    odds = math.exp(4.0 * power) * (0.4 / 3) / 0.4
+    assert j.inclusion["slack"] == pytest.approx(odds / (1 + odds))
 
 
 def test_forms_share_the_prior_of_their_name():

@@ -15,11 +15,13 @@ class Criteria:
             something as nothing, and rarely much at once; spread evenly over the names, and over the forms of a name.
         unknown: probability that the discrepancy is far larger than usual in one of its parts: something acts that the
             catalogue doesn't have, beside whatever else acts. Ground: as likely as two effects at once.
-        coarse: how many block means it takes to tell a model that is nearly right from the truth: the evidence of n of
-            them is raised to the power coarse / (coarse + n). Ground: the discrepancy's parts are not those of the
-            truth, so a posterior is too narrow, the more so the more data (coarsening: Miller and Dunson 2019, J. Am.
-            Stat. Assoc. 114). Its size is calibrated: of 48 opened cases with a rest that no part is like, n about
-            400, it makes 85 % of the answers right, and all of the evidence 73 %.
+        coarse: how many block means with a rest it takes to tell a model that is nearly right from the truth: the
+            evidence of n of them is raised to the power coarse / (coarse + n). Ground: the discrepancy's parts are not
+            those of the truth, so a posterior is too narrow, the more so the more data (coarsening: Miller and Dunson
+            2019, J. Am. Stat. Assoc. 114). Its size is calibrated: of 48 opened cases with a rest that no part is like,
+            n about 400, it makes 85 % of the answers right, and all of the evidence 73 %. Where the likeliest set
+            leaves noise there is no rest to be wrong about, and all of the evidence counts: n is the number of block
+            means times the share of what is left that is not noise.
         counted: block means that count at most: those of a material test. More are more channels of one motion.
         shares: standard deviation of the half-normal prior of a discrepancy's amplitude, a share of the stress, by
             family. Ground: what the best published laws leave of careful recordings, 1 to 4 % of the peak in all; of a
@@ -74,6 +76,6 @@ class Criteria:
         """How much of the stress an effect changes, of the rig or of the tissue."""
         return self.rig if rig else self.change
 
-    def power(self, n: int) -> float:
-        """Of the evidence of n block means, that sets are compared by."""
-        return self.coarse / (self.coarse + min(n, self.counted))
+    def power(self, n: int, left: float = 1.0) -> float:
+        """Of the evidence of n block means, that sets are compared by; `left`: the share of a rest in what is left."""
+        return self.coarse / (self.coarse + min(n, self.counted) * left)

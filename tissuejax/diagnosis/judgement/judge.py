@@ -88,12 +88,17 @@ def negligible(s: SetEvidence, criteria: Criteria) -> float:
     return float(norm.cdf((criteria.negligible**2 + s.numerical**2 - mean) / max(std, 1e-300)))
 
 
+def left(s: SetEvidence) -> float:
+    """The share of what a set leaves that is a rest and no noise, of the squares: 0 where it leaves noise alone."""
+    return max(1.0 - s.n / max(s.chi2, 1e-300), 0.0)
+
+
 def judge(evidence: Evidence, criteria: Criteria | None = None) -> Judgement:
     """The verdict that the evidence asks for; see the module's text."""
     criteria = criteria or Criteria()
     usable = [s for s in evidence.sets if not s.void and math.isfinite(s.log_evidence)]
     groups: dict[frozenset, list[tuple[float, SetEvidence]]] = {}
-    power = criteria.power(max(s.n for s in usable))
+    power = criteria.power(max(s.n for s in usable), left(max(usable, key=lambda s: s.log_evidence)))
     for s in usable:
         weight = power * s.log_evidence + log_prior(s, evidence.forms, criteria)
         groups.setdefault(frozenset(s.names), []).append((weight, s))
