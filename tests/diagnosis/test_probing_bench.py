@@ -154,12 +154,30 @@ def test_what_comes_late_is_told_from_what_rings(bench):
     assert 0.85 < slope < 1.15
 
 
+def test_what_rings_is_open_where_it_rings_and_by_its_size(bench, monkeypatch):
+    """An oscillation from where the probe stops, on a slow difference: seen there, in its channel, nowhere else."""
+    view = ProbingView.of(bench)
+    monkeypatch.setattr(bench, "calmed", lambda d: calmed(bench.segments, d, 0.1))  # a wave that takes 0.1 s
+    rung, size, s = np.zeros(len(view.y)), 0.01, view.segments[2]
+    assert (s.channel, s.component) == ("force", "z")
+    stop = s.time[np.argmax(s.drive > 0.99 * s.drive.max())]
+    rung[s.rows] = size * (s.time > stop) * np.sin(2.5 * np.arange(len(s.time)))
+    drifted = np.concatenate([0.02 * (s.time - s.time[0]) / np.ptp(s.time) for s in view.segments])
+    found = view._ringing(rung + drifted)
+    later = (s.time > stop + 0.4) & (s.time < s.time[-1] - 0.4)
+    assert found[s.rows][later].mean() == pytest.approx(size / np.sqrt(2), rel=0.1)
+    calm = s.time < stop - 0.6
+    assert found[s.rows][calm].max() < 0.03 * size
+    others = np.concatenate([found[o.rows] for o in view.segments if o is not s])
+    assert others.max() < 0.03 * size
+
+
 def test_what_is_open_is_a_column_for_every_channel_of_every_recording(bench):
     near = ProbingView.of(bench).anchored(VALUES)
     pairs = {(s.recording, s.channel) for s in bench.segments}
     fine, slow = (bench.runs.many([(bench.at(VALUES), bench.fitted, k)])[0] for k in (FINE, RETIMED))
-    assert set(near.numerical) == {"mesh", "speed"}
-    for columns in near.numerical.values():
+    assert set(near.numerical) == {"mesh", "speed", "ringing"}
+    for columns in (near.numerical["mesh"], near.numerical["speed"]):
         assert columns.shape == (len(bench.y), len(pairs))
         assert (np.count_nonzero(columns, axis=1) <= 1).all()
     mesh = near.numerical["mesh"].sum(axis=1) * near.unit

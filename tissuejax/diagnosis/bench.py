@@ -181,7 +181,7 @@ class Bench(abc.ABC):
         return None
 
     @property
-    def numerical(self) -> Mapping[str, Float[np.ndarray, "N q"]] | None:
+    def numerical(self) -> Mapping[str, Float[np.ndarray, "N ..."]] | None:
         """What mesh and speed of a simulation leave open, by cause, a column for each independent part; None in closed
         form."""
         return None

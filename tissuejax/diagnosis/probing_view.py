@@ -132,6 +132,7 @@ class ProbingView(Bench):
         made._open = {
             "mesh": self._errors(REMAINS * self.source.calmed(fine - slow) / self.unit),
             "speed": self._errors(EITHER * late / self.unit),
+            "ringing": self._ringing(slow - coarse) / self.unit,
         }
         return made
 
@@ -154,8 +155,18 @@ class ProbingView(Bench):
             out[rows] = r * float(r @ (slow - coarse)[rows]) / size if size > 0 else 0.0
         return out
 
+    def _ringing(self, difference: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+        """How much of a fine run rings, where the probe starts or stops: its size there, for its phase is not known.
+
+        What rings of the difference of two speeds, as large as an error of first order in the speed leaves it.
+        """
+        out, rings = np.zeros(len(difference)), difference - self.source.calmed(difference)
+        for s in self.segments:
+            out[s.rows] = np.sqrt(gaussian_filter1d(np.nan_to_num(rings[s.rows]) ** 2, CALMED))
+        return out
+
     @property
-    def numerical(self) -> Mapping[str, Float[np.ndarray, "N q"]] | None:
+    def numerical(self) -> Mapping[str, Float[np.ndarray, "N ..."]] | None:
         """See `Bench.numerical`."""
         return self._open
 

@@ -49,10 +49,14 @@ def rest(
         meant[r] -= n @ w[r]
         own = i - (g[r] @ inner) @ g[r].T
         wide[r] = np.diag(n) - np.einsum("ij,jk,ki->i", n, own, n)
-    known = [
-        x * p.factor @ (p.factor.T @ w) for p, x in zip(parts, v, strict=True) if p.family in {"numerical", *named}
-    ]
+    known = [x * _times(p, noise.rows, w) for p, x in zip(parts, v, strict=True) if p.family in {"numerical", *named}]
     return meant - sum(known), np.maximum(wide, 0.0)
+
+
+def _times(part: Part, rows: Sequence[slice], w: Float[np.ndarray, " M"]) -> Float[np.ndarray, " M"]:
+    if part.factor is not None:
+        return part.factor @ (part.factor.T @ w)
+    return np.concatenate([b @ w[r] for b, r in zip(part.within, rows, strict=True)])
 
 
 def wobble(mean: np.ndarray, variance: np.ndarray, peak: float) -> float:
@@ -63,10 +67,14 @@ def wobble(mean: np.ndarray, variance: np.ndarray, peak: float) -> float:
 
 def numerical(scales: "Scales", parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> float:
     """Root mean square of what is laid to mesh and step, a share of the peak."""
-    squares = [
-        x * np.mean(np.sum(p.factor**2, axis=1)) for p, x in zip(parts, v, strict=True) if p.family == "numerical"
-    ]
+    squares = [x * np.mean(_variance(p)) for p, x in zip(parts, v, strict=True) if p.family == "numerical"]
     return math.sqrt(float(sum(squares))) / scales.peak
+
+
+def _variance(part: Part) -> Float[np.ndarray, " M"]:
+    if part.factor is not None:
+        return np.sum(part.factor**2, axis=1)
+    return np.concatenate([np.diag(b) for b in part.within])
 
 
 def scatter(scales: "Scales", parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> Float[np.ndarray, " M"]:
@@ -74,7 +82,7 @@ def scatter(scales: "Scales", parts: Sequence[Part], v: Float[np.ndarray, " K"])
     extra = np.zeros(len(scales.blocked.sigma))
     for part, x in zip(parts, v, strict=True):
         if part.family == "white" and part.within is not None:
-            extra += x * np.concatenate([np.diag(b) for b in part.within])
+            extra += x * _variance(part)
     return extra / scales.blocked.sigma**2
 
 

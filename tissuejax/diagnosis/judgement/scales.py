@@ -48,7 +48,13 @@ class Scales:
         parts = self.discrepancy.about(np.nan_to_num(self.cut.mean(prediction)))
         if bench.numerical is None:
             return parts
-        return (*parts, *(Part(name, "numerical", self.cut.mean(x)) for name, x in bench.numerical.items()))
+        return (*parts, *(self._known(name, self.cut.mean(x)) for name, x in bench.numerical.items()))
+
+    def _known(self, name: str, error: Float[np.ndarray, "M ..."]) -> Part:
+        """A known error of a simulation: by columns, or where its sign is not known of each block alone."""
+        if error.ndim == 1:
+            return Part(name, "numerical", within=tuple(np.diag(error[r] ** 2) for r in self.blocked.rows))
+        return Part(name, "numerical", error)
 
     def priors(self, criteria: Criteria, keys: Sequence[str] = ()) -> Widths:
         """Prior of the amplitudes where the effects `keys` act.

@@ -160,7 +160,7 @@ def weigh(
         anew = False
         value = m.value + 0.5 * int(np.sum(inner)) * math.log(2 * math.pi)
         # of these parameters, and not of those that a straight line leads to: the parts move with the prediction
-        ahead = 0.0 if bench.costly else 0.5 * float(m.step @ m.precision @ m.step)
+        ahead = 0.5 * float(m.step @ m.precision @ m.step)
         value -= ahead
         value += sum(
             log_prior(bench.free[p], a, q) + 0.5 * w * o * o
