@@ -3,6 +3,8 @@
 import json
 import re
 import socket
+import subprocess
+import sys
 
 import h5py
 import numpy as np
@@ -50,12 +52,30 @@ def refused(capsys, *argv) -> str:
         ([*SLAB, "--site", "12;8"], "wanted is X,Y in mm"),
         ([*SLAB, "--mesh", "7x8x2"], "even numbers of at least 8"),
         ([*SLAB, "--depths", "2"], "at least 4"),
+        ([*SLAB, "--reach", "nan"], "--reach nan: wanted is a length over 0"),
+        ([*SLAB, "--spacing", "0"], "--spacing 0: wanted is a length over 0"),
+        ([*SLAB, "--depth", "inf"], "--depth inf: wanted is a length over 0"),
+        ([*SLAB, "--site", "1,nan"], "wanted is X,Y in mm"),
+        ([*SLAB, "--processes", "0"], "--processes 0"),
+        ([*SLAB, "--reach", "3", "--depth", "5", "--error", "0"], "--error 0: wanted is a percentage over 0"),
+        ([*SLAB, "--reach", "3", "--depth", "5", "--error", "nan"], "--error nan: wanted is a percentage over 0"),
     ],
 )
 def test_what_precompute_refuses(argv, words, capsys, tmp_path):
     said = refused(capsys, "precompute", *argv, "--out", tmp_path / "a.play.h5")
     assert re.search(words, said), said
     assert not list(tmp_path.glob("*.h5"))
+
+
+def test_an_error_is_not_called_reached_where_no_force_can_be_felt(capsys, tmp_path):
+    """0.6 mm deep there is no force over 0.05 N, so that no error can be told of it: without `--error` that is said."""
+    small = [*SMALL, "--processes", "1", "--out", tmp_path / "a.play.h5"]
+    said = refused(capsys, "precompute", *small, "--error", "1")
+    assert re.search(r"greatest held-out force is 0.0[0-4]\d N, .* over 0.05 N: take a larger --depth", said), said
+    assert main([*map(str, ["precompute", *small])]) == 0
+    told = capsys.readouterr().out
+    assert "0 held-out states over 0.05 N: force not measured" in told
+    assert "nan" not in told
 
 
 def test_a_fit_that_did_not_converge_needs_a_word(capsys, tmp_path):
@@ -109,6 +129,24 @@ def test_a_taken_port_is_refused_for_the_page(kept, capsys):
         said = refused(capsys, "play", kept, "--port", port, "--seconds", "5")
     assert f"port {port} can't be opened" in said
     assert "another --port" in said
+    assert "--port 99999: wanted is" in refused(capsys, "play", kept, "--port", "99999")
+    assert "--seconds -1: wanted is 0 or more" in refused(capsys, "play", kept, "--seconds", "-1")
+
+
+def test_without_permission_for_real_time_the_loop_runs_and_says_so(kept):
+    """The right to it is dropped for good by the process that starts the loop."""
+    code = (
+        "import ctypes, resource, sys; ctypes.CDLL(None).prctl(24, 23); "  # PR_CAPBSET_DROP, CAP_SYS_NICE
+        "resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0)); "
+        "from tissuejax.cli import main; sys.exit(main(sys.argv[1:]))"
+    )
+    words = ["play", str(kept), "--haptics", "none", "--seconds", "0.5"]
+    done = subprocess.run([sys.executable, "-c", code, *words, "--json"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    record = json.loads(done.stdout)
+    assert not record["real_time"]
+    assert record["policy"] == "SCHED_OTHER, not real time: no permission for real-time priority"
+    assert record["periods"] == 500
 
 
 def test_without_a_compiler_the_loop_is_refused_and_the_page_goes_on(kept, capsys, tmp_path, monkeypatch):
@@ -132,3 +170,5 @@ def test_a_direct_scene_slower_than_life_is_refused_with_a_mesh_that_would_do(ca
     assert "1536 elements run at 0.40 times life here, 1.25 are needed" in said
     assert "take --mesh 12x12x4 or coarser" in said
     assert "over 60 %" in refused(capsys, "play", "--direct", *SLAB, "--depth", "9")
+    assert "depth nan mm: wanted is a length" in refused(capsys, "play", "--direct", *SLAB, "--depth", "nan")
+    assert "(50.0, 0.0) mm is outside the organ" in refused(capsys, "play", "--direct", *SLAB, "--site", "50,0")

@@ -20,6 +20,17 @@ def test_results_come_back_in_order_and_equal():
     assert np.allclose(programs.run(_square, 3, x[1]), out[1])
 
 
+def test_helpers_are_given_back_and_new_ones_serve():
+    x = np.arange(12.0).reshape(4, 3)
+    jobs = [(_square, 3, row) for row in x]
+    workers.run_all(jobs, 2)
+    processes = [w.process for w in workers._workers]
+    workers.release()
+    assert processes
+    assert all(p.poll() is not None for p in processes)
+    assert np.allclose(workers.run_all(jobs, 2), 3 * x**2)
+
+
 def test_a_failing_job_raises_here():
     with pytest.raises(ValueError, match="no such thing"):
         workers.run_all([(_fails, 0, np.zeros(2))] * 3, 2)

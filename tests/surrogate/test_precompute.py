@@ -81,6 +81,55 @@ def test_sites_are_kept_and_a_second_run_takes_them(tmp_path, monkeypatch):
     assert np.array_equal(first.surrogate.law.coefficients, again.surrogate.law.coefficients)
 
 
+def test_sites_are_added_until_the_error_is_reached_or_they_no_longer_help(monkeypatch):
+    """Errors by the number of sites, as the full model would give them; the sites themselves are not computed."""
+    from tissuejax.surrogate import error
+    from tissuejax.surrogate import precompute as at_work
+
+    def run(wanted, errors):
+        counted = []
+
+        def none(self, places, depths, what, fields=None):
+            one = ramps.Ramp(*(np.zeros(1),) * 8)._replace(force=np.array([[0, 0, 0.1]]))
+            counted.append(len(places))
+            return [one] * len(places)
+
+        told = iter(errors)
+        monkeypatch.setattr(at_work._Sites, "all", none)
+        monkeypatch.setattr(at_work, "surrogate", lambda *given: None)
+        monkeypatch.setattr(at_work, "summary", lambda surrogate: {})
+        monkeypatch.setattr(error, "held_out", lambda made, tests: {"force_worst": next(told)})
+        found = precompute(made.matter(), box, made.SMALL, wanted, processes=1, numerical=False)
+        return found.record, counted
+
+    box = made.SMALL_BOX._replace(counts=(2, 2))
+    record, counted = run(0.01, [0.05, 0.02, 0.009])
+    assert counted == [6, 4, 9, 25]
+    assert record["box"]["sites"] == [5, 5]
+    assert [r["force_worst"] for r in record["rounds"]] == [0.05, 0.02, 0.009]
+    with pytest.raises(InputError, match=r"4.8 % with 3 x 3 sites, wanted is 1 %, and was 5 % .* more --depths"):
+        run(0.01, [0.05, 0.048])
+    with pytest.raises(InputError, match=r"0.13 % with 33 x 33 sites, .* smaller --reach or allow more --error"):
+        run(0.001, [0.04, 0.02, 0.01, 0.005, 0.0025, 0.0013])
+
+
+def test_modes_are_those_of_a_singular_value_decomposition_also_in_blocks(monkeypatch):
+    from tissuejax.surrogate import modes as at_work
+
+    rng = np.random.default_rng(2)
+    states = (rng.normal(size=(9, 3)) @ rng.normal(size=(3, 50)) + 1e-5 * rng.normal(size=(9, 50))).astype(np.float32)
+    weight = rng.uniform(0.5, 2, 50)
+    monkeypatch.setattr(at_work, "BLOCK", 7)
+    found = at_work.modes(states, 1e-3, 8, weight)
+    _, _, wanted = np.linalg.svd(states * np.sqrt(weight), full_matrices=False)
+    assert found.shapes.shape == (3, 50)
+    assert np.abs(found.shapes * np.sqrt(weight) @ wanted[:3].T) == pytest.approx(np.eye(3), abs=1e-4)
+    rest = states - (states * weight) @ found.shapes.T @ found.shapes
+    assert np.linalg.norm(rest * np.sqrt(weight)) / np.linalg.norm(states * np.sqrt(weight)) == pytest.approx(
+        found.lost, rel=1e-3
+    )
+
+
 def test_the_file_comes_back_and_damage_is_seen(tmp_path):
     found = made.small()
     path = store.write(found, tmp_path / "a.play.h5")

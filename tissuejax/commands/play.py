@@ -73,6 +73,8 @@ A loop without permission for real-time priority runs and says so. A direct scen
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Do it."""
+        if given.seconds is not None and not 0 <= given.seconds < np.inf:
+            raise InputError(f"--seconds {given.seconds:g}: wanted is 0 or more")
         if given.direct:
             with native.preferred() as in_c:
                 return _direct(given, in_c)
@@ -102,7 +104,8 @@ def _sample(given: argparse.Namespace):
     sample = read(given.replay)
     name = given.recording or next((n for n, r in sample.recordings.items() if r.experiment == "probing"), "")
     if name not in sample.recordings or sample.recordings[name].experiment != "probing":
-        raise InputError(f"--recording {name}: {given.replay} has {', '.join(sample.recordings)}; name a probing")
+        asked = f"--recording {name}" if name else "--replay"
+        raise InputError(f"{asked}: {given.replay} has {', '.join(sample.recordings)}; wanted is a probing")
     return sample, name, None if sample.geometry is None else lobe_of(sample)
 
 

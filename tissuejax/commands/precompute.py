@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from tissuejax.commands.arguments import positive
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.tissue_given import add_tissue, tissue
 from tissuejax.errors import InputError, NotConverged
@@ -55,6 +56,10 @@ command is given again. Softening, a moving or sliding base and escaping fluid c
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Tabulate and write."""
+        for name in ("reach", "depth", "spacing"):
+            if not 0 < getattr(given, name) < np.inf:
+                raise InputError(f"--{name} {getattr(given, name):g}: wanted is a length over 0, in mm")
+        positive(given.processes, "--processes")
         what = tissue(given)
         matter = what.matter
         if given.all:
@@ -62,8 +67,8 @@ command is given again. Softening, a moving or sliding base and escaping fluid c
         else:
             middle = what.site if given.site is None else place_of(given.site)
             low, high = middle - given.reach / 1e3, middle + given.reach / 1e3
-        if not given.spacing > 0 or given.depths < 4:
-            raise InputError(f"--spacing {given.spacing}, --depths {given.depths}: wanted are over 0 mm and at least 4")
+        if given.depths < 4:
+            raise InputError(f"--depths {given.depths}: wanted are at least 4")
         counts = tuple(max(2, int(np.ceil(1e3 * w / given.spacing - 1e-6)) + 1) for w in high - low)
         box = Box(low, high, given.depth / 1e3, counts, given.depths)
         name = "slab" if what.sample is None else what.sample.name
@@ -97,9 +102,13 @@ def described(record: dict) -> list[str]:
         f"{record['model']['energy']} with {', '.join(record['model']['effects']) or 'no effects'}: "
         f"{wide[0]:.1f} x {wide[1]:.1f} mm, to {1e3 * box['depth_m']:.1f} mm deep, "
         f"{box['sites'][0]} x {box['sites'][1]} sites, {box['depths']} depths",
-        f"error of the tables, {wrong['felt']} held-out states over 0.05 N: force median "
-        f"{100 * wrong['force_median']:.2f} %, worst {100 * wrong['force_worst']:.2f} %; shape rms "
-        f"{1e3 * wrong['surface_rms_m']:.3f} mm, worst {1e3 * wrong['surface_worst_m']:.2f} mm",
+        f"error of the tables, {wrong['felt']} held-out states over 0.05 N: force "
+        + (
+            f"median {100 * wrong['force_median']:.2f} %, worst {100 * wrong['force_worst']:.2f} %"
+            if wrong["felt"]
+            else "not measured, a larger --depth would"
+        )
+        + f"; shape rms {1e3 * wrong['surface_rms_m']:.3f} mm, worst {1e3 * wrong['surface_worst_m']:.2f} mm",
     ]
     if own and own["force_worst"] is not None:
         lines.append(
@@ -116,6 +125,8 @@ def place_of(text: str) -> np.ndarray:
     """`12,8` in mm as metres."""
     try:
         x, y = (float(part) / 1e3 for part in text.split(","))
+        if not np.isfinite([x, y]).all():
+            raise ValueError
     except ValueError:
         raise InputError(f"--site {text}: wanted is X,Y in mm, e.g. --site 12,8") from None
     return np.array([x, y])

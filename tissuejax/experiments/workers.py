@@ -81,6 +81,12 @@ def close_all() -> None:
         worker.close()
 
 
+def release() -> None:
+    """End the helpers, which idle, and give their memory back; the next `run_all` starts new ones."""
+    while _workers:
+        _workers.pop().close()
+
+
 def run_all(jobs: Sequence[Job], processes: int, do: Callable = programs.run) -> list:
     """Results of all jobs in order, on the host; this process takes them from the front, each worker from the back.
 

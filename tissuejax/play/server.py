@@ -42,8 +42,10 @@ class Server:
         """Serve; `ready(url)` is called once the port is open.
 
         Raises:
-            InputError: the port is taken.
+            InputError: the port is taken, or is none.
         """
+        if not 0 <= self.port <= 65535:
+            raise InputError(f"--port {self.port}: wanted is a number of 0 (any that is free) to 65535")
         try:
             server = serve(
                 self._page, self.host, self.port, process_request=self._http, max_size=BIGGEST, compression=None

@@ -157,11 +157,17 @@ def checked(box: Box, lobe: Lobe, radius: float) -> Box:
 
 
 def within_depth(lobe: Lobe, places: Float[np.ndarray, "n 2"], depth: float) -> None:
-    """Nothing, if the organ is thick enough for the depth at all places.
+    """Nothing, if the organ is there and thick enough for the depth at all places.
 
     Raises:
         InputError: it is not.
     """
+    away = rim_distance(lobe, places)
+    if away.min() <= 0:
+        x, y = 1e3 * places[int(away.argmin())]
+        raise InputError(f"place ({x:.1f}, {y:.1f}) mm is outside the organ: choose another --site")
+    if not 0 < depth < np.inf:
+        raise InputError(f"depth {1e3 * depth:g} mm: wanted is a length over 0")
     thickness = np.array([_thickness(lobe, p) for p in places])
     thin = int(thickness.argmin())
     if depth > DEEPEST * thickness[thin]:

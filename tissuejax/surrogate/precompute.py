@@ -24,6 +24,7 @@ from tissuejax.surrogate.tabulate import full_scene, summary, surrogate
 
 HELD_OUT, LEVELS = 6, (0.45, 0.7, 0.9, 1.0)  # places, and shares of the greatest depth, at which the error is measured
 MOST = 33  # sites along an axis
+HELPS = 0.9  # a halved spacing that leaves more than this share of the error does not help: something else is coarse
 SILENT = Silent()
 
 
@@ -54,10 +55,13 @@ def precompute(
         numerical: whether the full model's own error is measured too (two more ramps).
 
     Raises:
-        InputError: a box or depth the organ doesn't hold, an effect that can't be tabulated, an error not reached.
+        InputError: a box or depth the organ doesn't hold, an effect that can't be tabulated, an error that is not
+            reached or can't be measured.
         NotConverged: statics failed at some place and depth; finished sites are kept.
     """
     grid = grid or Grid((16, 16, 6), matter.radius)
+    if wanted is not None and not 0 < wanted < np.inf:
+        raise InputError(f"--error {100 * wanted:g}: wanted is a percentage over 0, e.g. --error 1")
     checked(box, matter.lobe, matter.radius)
     middle = (box.low + box.high) / 2
     refuse(matter, grid, middle)
@@ -70,20 +74,22 @@ def precompute(
     run = _Sites(matter, grid, contact, keep, processes, progress, prony is not None)
     checks = box.depth * np.asarray(LEVELS)
     tests = run.all(box.held_out(HELD_OUT), checks, "held-out places", fields=False)
+    felt = max(float(np.linalg.norm(r.force, axis=1).max()) for r in tests)
+    if wanted is not None and felt <= error.FELT:
+        raise InputError(
+            f"--error {100 * wanted:g}: the greatest held-out force is {felt:.3f} N, and errors are told of forces "
+            f"over {error.FELT:g} N: take a larger --depth, or leave --error out"
+        )
     rounds = []
     while True:
         ramps = run.all(box.sites().reshape(-1, 2), box.levels, f"{box.counts[0]} x {box.counts[1]} sites")
+        workers.release()  # the tables are made by this process alone
         made = surrogate(matter, box, grid, ramps, prony)
         found = error.held_out(made, tests)
         rounds.append({"sites": list(box.counts)} | found)
-        if wanted is None or not found["force_worst"] > wanted:
+        if wanted is None or found["force_worst"] <= wanted:
             break
-        if max(box.refined().counts) > MOST:
-            raise InputError(
-                f"the error at held-out places is {100 * found['force_worst']:.2g} % with {box.counts[0]} x "
-                f"{box.counts[1]} sites, wanted is {100 * wanted:g} %: take a smaller --reach or allow more --error"
-            )
-        box = box.refined()
+        box = _refined(box, rounds, wanted)
     own = None
     if numerical:
         with progress.stage("numerical error of the full model", 1) as stage:
@@ -103,6 +109,25 @@ def precompute(
         **summary(made),
     }  # fmt: skip
     return Precomputed(made, record, geometry(matter.lobe, middle, grid).cells)
+
+
+def _refined(box: Box, rounds: Sequence[dict], wanted: float) -> Box:
+    """The box with half the spacing between its sites.
+
+    Raises:
+        InputError: halving the spacing did not help the last time, or there are too many sites.
+    """
+    nx, ny = box.counts
+    error = rounds[-1]["force_worst"]
+    said = f"the error at held-out places is {100 * error:.2g} % with {nx} x {ny} sites, wanted is {100 * wanted:g} %"
+    if len(rounds) > 1 and error > HELPS * rounds[-2]["force_worst"]:
+        raise InputError(
+            f"{said}, and was {100 * rounds[-2]['force_worst']:.2g} % with half as many along each side: places are "
+            f"close enough, take more --depths (here {box.depths}), a finer --mesh, or allow more --error"
+        )
+    if max(box.refined().counts) > MOST:
+        raise InputError(f"{said}: take a smaller --reach or allow more --error")
+    return box.refined()
 
 
 def described(matter: Matter) -> dict:
