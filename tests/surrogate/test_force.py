@@ -5,8 +5,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.optimize import brentq, minimize_scalar
 
 from tests.surrogate import made
+from tissuejax.surrogate import drag
 from tissuejax.surrogate.cardinal import design, from_depths, through
 from tissuejax.surrogate.live.ask import Asker
 
@@ -144,6 +146,38 @@ def test_the_neck_of_soft_tissue_takes_its_share_of_the_pull(share):
     assert got[:, 2] - plain == pytest.approx(share * (rigid - plain), abs=1e-9)
     theirs = eqx.filter_jit(lambda s, t, p: s.respond(t, p))(soft, jnp.asarray(t), jnp.asarray(path))
     assert np.allclose(got, theirs, atol=1e-10)
+
+
+def maugis(lam: float) -> float:
+    """Pull-off force over pi w R by Maugis's own equations (1992, 6.17 and its load): a ring of constant stress around
+    the contact, solved for its width at each radius of contact."""
+
+    def load(a):
+        def opening(m):
+            mu = np.sqrt(m * m - 1)
+            t = np.arctan(mu)
+            return lam * a * a / 2 * (mu + (m * m - 2) * t) + 4 / 3 * lam * lam * a * (mu * t - m + 1) - 1
+
+        m = brentq(opening, 1.0, 1e6)
+        mu = np.sqrt(m * m - 1)
+        return a**3 - lam * a * a * (mu + m * m * np.arctan(mu))
+
+    return -minimize_scalar(load, bounds=(0.02, 2.0), method="bounded").fun
+
+
+def test_the_share_of_the_neck_is_that_of_maugis():
+    """The fitted formula beside the equations it was fitted to, over four decades of stiffness; the limits are those of
+    a rigid surface, 2 pi w R, and of Johnson, Kendall and Roberts, 1.5 pi w R."""
+    sigma, reach = 300.0, 2e-4
+    work, apart = np.e * sigma * reach, []
+    for modulus in np.geomspace(1e2, 1e6, 17):
+        lam = 2 * sigma * np.cbrt(made.RADIUS / (np.pi * work * (4 / 3 * modulus) ** 2))
+        s = made.formula(strength=sigma, modulus=modulus)
+        apart.append(2 * float(drag.neck(s.rub, s.radius, s.factor)) / maugis(lam) - 1)
+    assert np.abs(apart).max() < 0.017
+    for modulus, share in ((1e-3, 0.75), (1e12, 1.0)):
+        s = made.formula(strength=sigma, modulus=modulus)
+        assert float(drag.neck(s.rub, s.radius, s.factor)) == pytest.approx(share, abs=1e-4)
 
 
 def test_friction_reaches_the_coulomb_limit_and_turns_with_the_motion():

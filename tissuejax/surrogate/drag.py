@@ -16,7 +16,8 @@ ball (Derjaguin 1934) the ring sums up to 2 pi R times the integral of that over
 to half of what the ball has been lifted since its deepest; bonds are gone five reaches away. That is the sum over a
 surface that stays where it is. Soft tissue follows the ball in a neck, and the pull at which it lets go falls from
 2 pi w R to 1.5 pi w R (w = e sigma reach, the work of separation). Between the two `neck` takes the share that Carpick,
-Ogletree and Salmeron (1999) fitted to Maugis's solution (1992).
+Ogletree and Salmeron (1999, J. Colloid Interface Sci. 211, 395) fitted to Maugis's equations (1992, 150, 243), which it
+meets to 1.7 % for any modulus (a test solves them); sigma is the greatest stress of a bond.
 """
 
 from typing import NamedTuple
