@@ -26,6 +26,8 @@ class Mark:
         all_named: all effects named, whatever else.
         open_right: exact, or ambiguous with the truth among what was offered.
         right: what this category asks for: nothing, the exact set, or abstention.
+        apt: whether the answer as such is true, which is what its stated probability is of: "found-in-part" of some of
+            the effects, or of all where the laws are others than the catalogue's; "ambiguous" with the truth offered.
         held_out_ratio: rms error on the held-out recording over that of the truth itself; nan if not reported.
         confidence: as stated, or nan.
         seconds: wall time.
@@ -46,6 +48,7 @@ class Mark:
     all_named: bool
     open_right: bool
     right: bool
+    apt: bool
     held_out_ratio: float
     confidence: float
     seconds: float
@@ -103,6 +106,15 @@ def mark(name: str, key: dict, result: dict, seconds: float = math.nan) -> Mark:
         right = verdict == "unexplained"
     else:
         right = exact
+    plain = all(key.get("plain", {}).values())
+    in_part = bool(counted) and (counted < set(truth) or (exact and not plain))
+    apt = {
+        "nothing-missing": category == "none",
+        "found": exact,
+        "found-in-part": in_part and category != "unknown",
+        "ambiguous": ambiguous,
+        "unexplained": category == "unknown",
+    }.get(verdict, False)
     sizes = [s for s in key["size_over_noise"].values() if s is not None]
     return Mark(
         name=name,
@@ -112,7 +124,7 @@ def mark(name: str, key: dict, result: dict, seconds: float = math.nan) -> Mark:
         named=named,
         alternatives=offered,
         size=min(sizes) if sizes else math.nan,
-        plain=all(key.get("plain", {}).values()),
+        plain=plain,
         member=all(key["member"].values()) if "member" in key else None,
         correlated=key.get("noise", {}).get("correlation", 0.0) > 0,
         first=settled and bool(named) and named[0] in truth,
@@ -120,6 +132,7 @@ def mark(name: str, key: dict, result: dict, seconds: float = math.nan) -> Mark:
         all_named=settled and bool(truth) and set(truth) <= set(named),
         open_right=exact or ambiguous,
         right=right,
+        apt=apt,
         held_out_ratio=held_out_ratio(key, result),
         confidence=_number(result.get("confidence")),
         seconds=seconds,
