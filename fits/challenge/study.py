@@ -16,9 +16,9 @@ VISIBLE = 3.0
 BEGIN, END = "<!-- pooled: written by the study -->", "<!-- end of pooled -->"
 CURRENT = {
     "material": ("material", "material-second", "material-third", "material-fourth", "material-fifth",
-                 "material-sixth"),
+                 "material-sixth", "material-seventh"),
     "probing": ("probing", "probing-strong", "probing-strong-second", "probing-pairs", "probing-second",
-                "probing-strong-third"),
+                "probing-strong-third", "probing-third"),
 }  # fmt: skip
 
 
@@ -58,15 +58,26 @@ def counted(rows: list[dict]) -> dict:
     }
 
 
+def apt(row: dict) -> bool:
+    """Whether the answer as such is true (`challenge.verdicts.Mark.apt`), for rows from before that was graded too."""
+    if "apt" in row:
+        return true(row, "apt")
+    truth, named = (set(filter(None, row[c].split(" + "))) for c in ("truth", "named"))
+    if row["verdict"] == "found-in-part":
+        in_part = bool(named) and (named < truth or (true(row, "exact") and not true(row, "plain")))
+        return in_part and row["category"] != "unknown"
+    return true(row, "open_right" if row["verdict"] == "ambiguous" else "right")
+
+
 def confidence(rows: list[dict]) -> dict:
-    """Stated against right, and the expected calibration error."""
+    """Stated against true, and the expected calibration error."""
     stated = [r for r in rows if r["confidence"] not in ("", "nan")]
     bins = []
     for low, high in zip(STATED, STATED[1:]):
         here = [r for r in stated if low <= float(r["confidence"]) < high or (high == 1 == float(r["confidence"]))]
         if here:
             mean = sum(float(r["confidence"]) for r in here) / len(here)
-            bins.append({"from": low, "to": high, "stated": mean} | rate(here, lambda r: true(r, "right")))
+            bins.append({"from": low, "to": high, "stated": mean} | rate(here, apt))
     error = sum(b["of"] * abs(b["stated"] - b["share"]) for b in bins) / max(len(stated), 1)
     return {"bins": bins, "expected_calibration_error": error, "of": len(stated)}
 
@@ -94,7 +105,7 @@ def main(folder: Path) -> str:
         )
         told = found[kind]["confidence"]
         lines += ["", f"Stated confidence of all {told['of']} answers that state one (expected calibration error "
-                  f"{told['expected_calibration_error']:.2f}):", "", "| stated | mean | right | 95 % interval |",
+                  f"{told['expected_calibration_error']:.2f}):", "", "| stated | mean | true | 95 % interval |",
                   "|---|---|---|---|"]  # fmt: skip
         for b in told["bins"]:
             lines.append(
