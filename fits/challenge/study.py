@@ -16,7 +16,7 @@ VISIBLE = 3.0
 BEGIN, END = "<!-- pooled: written by the study -->", "<!-- end of pooled -->"
 CURRENT = {
     "material": ("material", "material-second", "material-third", "material-fourth", "material-fifth",
-                 "material-sixth", "material-seventh"),
+                 "material-sixth", "material-seventh", "material-eighth"),
     "probing": ("probing", "probing-strong", "probing-strong-second", "probing-pairs", "probing-second",
                 "probing-strong-third", "probing-third"),
 }  # fmt: skip

@@ -3,10 +3,12 @@
 Environment: TISSUEJAX_CACHE names the folder ("" or "off" switches it off); default is the user's cache folder.
 """
 
+import gc
 import hashlib
 import os
 import stat
 import warnings
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,7 @@ ENVIRONMENT = "TISSUEJAX_CACHE"
 WORTHWHILE = 0.3  # s of compilation from which a program is kept
 TRACED = "traced"  # subfolder of what tracing gave
 MARK = 32  # bytes of a hash
+_all: weakref.WeakSet["Kept"] = weakref.WeakSet()
 MOST = 1000  # files kept there, of a tenth of a megabyte each
 
 
@@ -69,6 +72,14 @@ def own(where: Path) -> bool:
     return False
 
 
+def forget_programs() -> None:
+    """Drop all compiled programs of this process."""
+    for kept in tuple(_all):
+        kept.forget()
+    jax.clear_caches()
+    gc.collect()
+
+
 class Kept:
     """A function compiled once for every shape of its arguments, and kept on disk with what tracing gave.
 
@@ -85,6 +96,11 @@ class Kept:
         """
         self._function, self._said = function, said
         self._known: dict[Any, Callable] = {}
+        _all.add(self)
+
+    def forget(self) -> None:
+        """Drop what was compiled; it is made again, or read from the disk, when it is called."""
+        self._known.clear()
 
     def __call__(self, *arguments: Any) -> Any:
         """The function's value."""

@@ -9,6 +9,7 @@ import jax
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tissuejax.cache.crowding import make_room
 from tissuejax.cache.programs import keep_programs
 from tissuejax.diagnosis.cutting import CuttingBench, strokes_to_settle
 from tissuejax.diagnosis.foreseen import OPEN, foreseen
@@ -96,6 +97,7 @@ def diagnose(
     begun = time.perf_counter()
     jax.config.update("jax_enable_x64", True)
     keep_programs()
+    make_room()
     sample = source if isinstance(source, Sample) else read(source)
     fitted, held_out, remarks = split(sample, holdout)
     refuse_unusable(sample, (*fitted, *held_out))
