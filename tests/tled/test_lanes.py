@@ -1,12 +1,14 @@
 """The element loop in C computes what JAX computes of the same lane, and so do its derivatives, whatever is in it."""
 
 import dataclasses
+import time
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.special import expit
 
 from tests.tled import cases
 from tissuejax.mesh.columns import box
@@ -111,6 +113,44 @@ def test_contact_in_c_is_contact_by_xla(monkeypatch, form, rough):
     for a, b in zip(jax.tree.leaves(ours), jax.tree.leaves(known), strict=True):
         assert np.allclose(a, b, rtol=0, atol=1e-11 * max(np.abs(b).max(), 1e-6))  # a ball has no torque
     assert np.abs(known[0][0][0]).max() > 1e-3
+
+
+def test_points_far_from_the_probe_cost_no_more_than_others():
+    """Softness of a millimetre keeps every point within range of the exponential; with one of 5 um most are so far that
+    it underflows, and a vector function that meets such a number goes through its vector one by one (twice as
+    long, before the argument was kept within `FAINT`)."""
+    made = cases.plain(box((0.02, 0.02, 0.01), (8, 8, 2)), np.arange(2.0), order=1).cast(jnp.float32)
+    points = np.asarray(made.body.points)
+    facets = boundary(np.asarray(made.body.cells), "hexahedron").nodes
+    facets = facets[(points[facets][..., 2] > 0.0099).all(1)]
+    path = np.array([[0, 0, 0.02], [0, 0, 0.02]])
+    probe = build.probe(made, Sphere(4e-3), [0.0, 1.0], path, facets, penalty=2e6, softness=1e-3)
+    single = lambda x: jnp.asarray(x) if np.asarray(x).dtype.kind == "i" else jnp.asarray(x, jnp.float32)  # noqa: E731
+    probe = jax.tree.map(single, probe)
+    patch = contact.patch(eqx.tree_at(lambda s: s.probe, made, probe, is_leaf=lambda x: x is None))
+    at, u = jnp.array([0.0, 0.0, 0.0135], jnp.float32), jnp.zeros((3, len(points)), jnp.float32)
+
+    @jax.jit
+    def again(softness):
+        here = dataclasses.replace(probe, softness=softness)
+        near = lambda _, force: contact.forces(here, patch, u, at + 0 * force, contact.untouched(here)).force  # noqa: E731
+        return jax.lax.fori_loop(0, 2000, near, jnp.zeros(3, jnp.float32))
+
+    spent = {}
+    for _ in range(9):
+        for softness in (1e-3, 5e-6):
+            begun = time.process_time()
+            again(jnp.asarray(softness, jnp.float32)).block_until_ready()
+            spent.setdefault(softness, []).append(time.process_time() - begun)
+    soft, hard = (min(s[1:]) for s in spent.values())
+    assert hard < 1.5 * soft
+
+
+@pytest.mark.parametrize("z", [-1e3, -40.1, -39.9, -1.0, 0.0, 2.0, 39.9, 1e3])
+def test_softplus_and_its_slope(z):
+    got, slope = jax.value_and_grad(contact.softplus)(z)
+    assert float(got) == (pytest.approx(np.logaddexp(0, z), rel=1e-12) if z > -40 else 0)
+    assert float(slope) == pytest.approx(expit(z) if z else float(slope), rel=1e-12, abs=1e-17)
 
 
 def test_operations_without_a_form_in_c_are_left_to_jax():

@@ -20,6 +20,7 @@ from tissuejax.tled.scene import Probe, Scene
 
 BONDED = 4.0  # a point that comes as near as zero gap is bonded by 98 %, however lightly it is pressed
 PIERCED = 0.05  # penetration over the probe's radius from which contact no longer holds
+FAINT = 40.0  # softplus(-40) = 4e-18 is set to zero: smaller numbers underflow, which processors do slowly, one by one
 BREAK = 5.0  # gap over reach at which a bond is gone: exp(1 - 5) * 5 = 9 % of the greatest pull
 
 
@@ -95,8 +96,10 @@ def total(x: Float[Array, "r n"]) -> Float[Array, ""]:
     return jnp.sum(barrier(jnp.sum(x, 0)))
 
 
-def _softplus(z):
-    return jnp.maximum(z, 0.0) + jnp.log1p(jnp.exp(-jnp.abs(z)))
+def softplus(z):
+    """log(1 + exp z), zero below -`FAINT`."""
+    soft = jnp.maximum(z, 0.0) + jnp.log1p(jnp.exp(-jnp.minimum(jnp.abs(z), FAINT)))
+    return jnp.where(z > -FAINT, soft, 0.0)
 
 
 class Pressed(NamedTuple):
@@ -128,7 +131,7 @@ def by_facet(probe: Probe, x, ue, centre: Float[Array, " 3"], grip: Grip) -> Pre
     shape, _ = quadrature(len(x[0]))
     x = _placed(x, ue, centre, shape)
     gap, normal = probe.shape.distance(x)
-    pressure = barrier(probe.penalty * probe.softness * _softplus(-gap / probe.softness))  # once, not once a component
+    pressure = barrier(probe.penalty * probe.softness * softplus(-gap / probe.softness))  # once, not once a component
     push, bond = pressure, grip.bond
     if probe.adhesion is not None:
         touched = jax.nn.sigmoid(BONDED - gap / probe.softness)
@@ -197,7 +200,7 @@ def gripped(probe: Probe, patch: Patch, u: Float[Array, "3 N"], centre: Float[Ar
     shape, _ = quadrature(patch.nodes.shape[0])
     x = places(patch, u, centre, shape)
     gap, normal = probe.shape.distance(x)
-    pressure = probe.penalty * probe.softness * _softplus(-gap / probe.softness)
+    pressure = probe.penalty * probe.softness * softplus(-gap / probe.softness)
     drag, _, _ = _friction(probe, x, normal, pressure, grip.anchor)
     spring = probe.penalty / (1.0 + probe.penalty * probe.give)
     return 0.5 * jnp.sum(probe.area * sum(d * d for d in drag)) / spring

@@ -20,7 +20,7 @@ from tissuejax.cache.programs import own
 
 ENVIRONMENT = "TISSUEJAX_NATIVE"
 FLAGS = ("-O2", "-ftree-vectorize", "-march=native", "-std=gnu11", "-shared", "-fPIC", "-fopenmp-simd",
-         "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-w")  # fmt: skip
+         "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fno-tree-pre", "-w")  # fmt: skip
 VECTOR_MATH = ('-DSIMD=__attribute__((__simd__("notinbranch"),const))', "-lmvec")  # glibc's, where it has them
 KEPT = "native"  # subfolder of the programs that are kept
 
