@@ -84,11 +84,12 @@ def draw(runs: dict, truth: np.ndarray, ball: np.ndarray, coarse: dict) -> Figur
         for where, mark in (("over a node", "-"), ("between nodes", "--")):
             right.plot(1e3 * DEPTHS, coarse[where][kind], mark, color=colour, linewidth=1.1, label=f"{kind}, {where}")
     right.set_title("contact on elements of 10 mm", fontsize=9)
+    left.legend(fontsize=6)
+    right.legend(fontsize=6, loc="center left", bbox_to_anchor=(1, 0.5))
     for ax in (left, right):
         ax.set_xlabel("depth (mm)")
         ax.set_ylabel("force (N)")
         ax.set_ylim(-0.02, 1.15)
-        ax.legend(fontsize=6)
         ax.spines[["top", "right"]].set_visible(False)
     return figure
 
