@@ -14,7 +14,7 @@ from tissuejax.errors import InputError, NotConverged
 from tissuejax.progress import for_terminal
 from tissuejax.surrogate import store
 from tissuejax.surrogate.places import Box, whole_top
-from tissuejax.surrogate.precompute import precompute
+from tissuejax.surrogate.precompute import BOX_MESH, TOP_MESH, precompute
 from tissuejax.surrogate.site_mesh import Grid
 
 
@@ -50,7 +50,7 @@ command is given again. Softening, a moving or sliding base and escaping fluid c
         parser.add_argument("--error", type=float, metavar="PERCENT", help="add sites until held-out errors are below")
         parser.add_argument("--spacing", type=float, default=6.0, metavar="MM", help="between first sites (default 6)")
         parser.add_argument("--depths", type=int, default=8, metavar="N", help="depths at each site (default 8)")
-        parser.add_argument("--mesh", default="16x16x6", metavar="AxBxC", help="elements of a site (default 16x16x6)")
+        parser.add_argument("--mesh", metavar="AxBxC", help="elements of a site (default 22x22x8; with --all 16x16x6)")
         parser.add_argument("--processes", type=int, default=2, metavar="N", help="side by side (default 2)")
         parser.add_argument("--out", "-o", type=Path, metavar="FILE", help="default: out/SAMPLE.play.h5")
 
@@ -75,7 +75,8 @@ command is given again. Softening, a moving or sliding base and escaping fluid c
         out = given.out or Path("out") / f"{name}.play.h5"
         keep = out.with_name(out.name + ".sites")
         wanted = None if given.error is None else given.error / 100
-        grid = Grid(counts_of(given.mesh), matter.radius)
+        usual = TOP_MESH if given.all else BOX_MESH
+        grid = Grid(counts_of(given.mesh) if given.mesh else usual, matter.radius)
         try:
             made = precompute(matter, box, grid, wanted, keep, for_terminal(), given.processes)
         except NotConverged as fault:

@@ -86,25 +86,33 @@ def read_off(material: Material, lobe: Lobe, grid: Grid, place, fields: Float[np
     return np.moveaxis(RegularGridInterpolator(own, values)(inside), -1, 0)
 
 
-def between_sites(box: Box, ramps: Sequence[Ramp]) -> tuple[tuple[int, int], list[Ramp]]:
-    """Places no more than `FINEST` apart, and the fields there, interpolated between the sites in the mesh that moves.
+class Dense(NamedTuple):
+    """Places no more than `FINEST` apart, and what interpolates a field of the sites to them, in the mesh that moves.
 
     Seen from a fixed point of the material the stress under a passing ball changes over the width of the contact, and
     sites that are good enough for the force are too far apart for it. Seen from the ball it hardly changes.
     """
+
+    counts: tuple[int, int]
+    places: Float[np.ndarray, "n 2"]
+    rows: tuple[Float[np.ndarray, "a m"], Float[np.ndarray, "b p"]]
+    ramps: Sequence[Ramp]
+
+    def field(self, name: str) -> Float[np.ndarray, "n k E 6"]:
+        """`strain` or `stress` at all places: large, so one at a time."""
+        some = np.stack([getattr(r, name) for r in self.ramps]).astype(np.float32)
+        at = some.reshape(*(r.shape[1] for r in self.rows), -1)
+        return np.einsum("ai,bj,ijk->abk", *self.rows, at, optimize=True).reshape(-1, *some.shape[1:])
+
+
+def between_sites(box: Box, ramps: Sequence[Ramp]) -> Dense:
+    """The places between the sites of a box."""
     counts, rows = [], []
     for n, gap in zip(box.counts, box.spacing):
         counts.append((n - 1) * max(1, int(np.ceil(gap / FINEST - 1e-9))) + 1)
         rows.append((design(np.linspace(0, n - 1, counts[-1]), max(n - 1, 1)) @ through(n)).astype(np.float32))
-
-    def spread(name):
-        some = np.stack([getattr(r, name) for r in ramps]).astype(np.float32).reshape(*box.counts, -1)
-        some = np.einsum("ai,bj,ijk->abk", *rows, some, optimize=True)
-        return some.reshape(-1, *getattr(ramps[0], name).shape)
-
     places = box._replace(counts=tuple(counts)).sites().reshape(-1, 2)
-    strain, stress = spread("strain"), spread("stress")
-    return tuple(counts), [ramps[0]._replace(place=p, strain=e, stress=s) for p, e, s in zip(places, strain, stress)]
+    return Dense(tuple(counts), places, tuple(rows), ramps)
 
 
 class Projected(NamedTuple):
@@ -115,16 +123,20 @@ class Projected(NamedTuple):
     modes: Modes
 
 
-def projected(material: Material, lobe: Lobe, grid: Grid, ramps: Sequence[Ramp], tolerance: float = TOLERANCE):
-    """All states of all ramps in stress modes."""
+def projected(material: Material, lobe: Lobe, grid: Grid, dense: Dense, tolerance: float = TOLERANCE) -> Projected:
+    """All states of all places in stress modes."""
     metric = (material.volume[:, None] * DOUBLE).ravel()
-    ends = np.cumsum([0, *(len(r.depth) for r in ramps)])
-    stress = np.empty((ends[-1], len(metric)), np.float32)  # the one large array: 130 MB for 24 x 24 mm
-    for r, a, b in zip(ramps, ends, ends[1:]):
-        stress[a:b] = read_off(material, lobe, grid, r.place, r.stress).reshape(b - a, -1)
+
+    def rows(name):
+        for place, some in zip(dense.places, dense.field(name)):
+            yield read_off(material, lobe, grid, place, some).reshape(len(some), -1)
+
+    each = len(dense.ramps[0].depth)
+    stress = np.empty((each * len(dense.places), len(metric)), np.float32)  # 130 to 180 MB for 24 x 24 mm
+    for i, some in enumerate(rows("stress")):
+        stress[each * i : each * (i + 1)] = some
     found = modes(stress, tolerance, MOST, metric)
     weighted = (found.shapes * metric).T
-    strain = [read_off(material, lobe, grid, r.place, r.strain).reshape(len(r.depth), -1) @ weighted for r in ramps]
-    return Projected(
-        np.concatenate([stress[a:b] @ weighted for a, b in zip(ends, ends[1:])]), np.concatenate(strain), found
-    )
+    found_stress = np.concatenate([stress[i : i + each] @ weighted for i in range(0, len(stress), each)])
+    del stress
+    return Projected(found_stress, np.concatenate([some @ weighted for some in rows("strain")]), found)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import jax
 import numpy as np
 
 from tissuejax.energies.catalogue import forms_of, name_of
@@ -22,6 +23,7 @@ from tissuejax.surrogate.site_mesh import Grid, geometry
 from tissuejax.surrogate.surrogate import Surrogate
 from tissuejax.surrogate.tabulate import full_scene, summary, surrogate
 
+BOX_MESH, TOP_MESH = (22, 22, 8), (16, 16, 6)  # elements of a site: for a box; for a whole top, in half the time
 HELD_OUT, LEVELS = 6, (0.45, 0.7, 0.9, 1.0)  # places, and shares of the greatest depth, at which the error is measured
 MOST = 33  # sites along an axis
 HELPS = 0.9  # a halved spacing that leaves more than this share of the error does not help: something else is coarse
@@ -59,7 +61,7 @@ def precompute(
             reached or can't be measured.
         NotConverged: statics failed at some place and depth; finished sites are kept.
     """
-    grid = grid or Grid((16, 16, 6), matter.radius)
+    grid = grid or Grid(BOX_MESH, matter.radius)
     if wanted is not None and not 0 < wanted < np.inf:
         raise InputError(f"--error {100 * wanted:g}: wanted is a percentage over 0, e.g. --error 1")
     checked(box, matter.lobe, matter.radius)
@@ -92,6 +94,8 @@ def precompute(
         box = _refined(box, rounds, wanted)
     own = None
     if numerical:
+        del ramps, tests
+        run.close()
         with progress.stage("numerical error of the full model", 1) as stage:
             own = error.numerical(matter, grid, middle, float(contact.sample(middle[None])[0, 0]), checks)
             stage.advance()
@@ -189,6 +193,12 @@ class _Sites:
                     stage.advance()
         return [self.known[k] for k in keys]
 
+    def close(self) -> None:
+        """Give back the memory of states and compiled programs: the finer mesh of the numerical error needs as much."""
+        self.known.clear()
+        jax.clear_caches()
+        workers.trim()
+
     def _key(self, place, depths, fields) -> str:
         text = f"{self.hash} {np.round(place, 9).tolist()} {np.round(depths, 9).tolist()} {fields}"
         return hashlib.sha256(text.encode()).hexdigest()[:24]
@@ -210,4 +220,5 @@ def one_site(matter: Matter, grid: Grid, place, contact: float, depths, fields: 
     slim = found._replace(strain=found.strain.astype(np.float32), stress=found.stress.astype(np.float32))
     if file is not None:
         write_npz(file, slim._asdict())
+    workers.trim()
     return tuple(slim)

@@ -45,11 +45,12 @@ def surrogate(matter: Matter, box: Box, grid: Grid, ramps: list[Ramp], prony: tu
     memory = None
     if prony is not None:
         material = stress_memory.material(matter.lobe, box, grid)
-        counts, dense = stress_memory.between_sites(box, ramps)
+        dense = stress_memory.between_sites(box, ramps)
+        counts = dense.counts
         kept = stress_memory.projected(material, matter.lobe, grid, dense)
         close = box._replace(counts=counts)
         fine = [*(through(n) for n in counts), floor]
-        below = np.tile(levels, len(dense))[:, None]
+        below = np.tile(levels, len(dense.places))[:, None]
 
         def everywhere(values):
             gaps = np.append(close.spacing, 1 / box.depths)
