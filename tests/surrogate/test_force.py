@@ -210,3 +210,29 @@ def test_derivatives_by_path_and_by_leaves():
     for along in np.eye(2):
         wanted = (float(slope(at + h * along, along)[0]) - float(slope(at - h * along, along)[0])) / (2 * h)
         assert float(slope(at, along)[1]) == pytest.approx(wanted, rel=1e-4)
+
+
+def test_a_fit_through_a_surrogate_finds_stiffness_and_relaxation_again():
+    """A cheap first model: twenty Gauss-Newton steps at most on a recording that another stiffness and share made."""
+    s, truth = made.formula(g=(0.2,), tau=(0.5,)), np.array([1.3, 0.35])
+    t = np.linspace(0, 3, 200)
+    d = np.interp(t, [0, 0.5, 2, 3], [-1e-3, 4e-3, 4e-3, -1e-3])
+    path = np.stack([0 * t + 0.002, 0 * t, made.height(0.002, 0.0) - d], 1)
+    noise = 1e-3 * np.random.default_rng(1).normal(size=(200, 3))
+
+    def force_of(theta):
+        return s.put({"factor": theta[0], "memory.g": theta[1:]}).respond(jnp.asarray(t), jnp.asarray(path))
+
+    measured = np.asarray(force_of(truth)) + noise
+    residual = jax.jit(lambda theta: (force_of(theta) - measured).ravel())
+    tangents, theta = jax.jit(jax.jacfwd(residual)), np.array([1.0, 0.1])
+    for _ in range(20):
+        J = np.asarray(tangents(theta))
+        step = np.linalg.lstsq(J, -np.asarray(residual(theta)), rcond=None)[0]
+        theta = theta + step
+        if np.abs(step).max() < 1e-9:
+            break
+    std = 1e-3 * np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
+    assert np.abs(step).max() < 1e-9
+    assert (np.abs(theta - truth) < 3 * std).all()
+    assert (std < 0.05).all()
