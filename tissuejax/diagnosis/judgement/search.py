@@ -1,7 +1,8 @@
 """The course of a search: the base, single effects, pairs and triples, and what may have happened at once.
 
-What happened at once comes in before the pairs where it describes the recordings better, beside the base, than any
-single effect does, and at the end beside the best sets.
+Where even the best single effect leaves a part of the discrepancy that is likelier something unknown, every effect is
+tried in all its forms. What happened at once comes in before the pairs where it describes the recordings better, beside
+the base, than any single effect does, and at the end beside the best sets.
 """
 
 from collections.abc import Callable
@@ -87,5 +88,9 @@ def alone(
     e.extend([frozenset()], effort.singles, effort.singles)
     for key in e.near(1)[: effort.reshaped[0]]:
         e.reshape(key)
+    if e.strange and not bench.costly:
+        # a law unlike an effect's plain form leaves that form far behind, where no form near the top leads to it
+        for key in e.ranked(1):
+            e.reshape(key)
     e.settle(1)
     return e
