@@ -2,7 +2,7 @@
 
 import pytest
 
-from tissuejax.challenge.grade import calibration
+from tissuejax.challenge.grade import calibration, untold
 from tissuejax.challenge.verdicts import mark
 
 
@@ -56,3 +56,27 @@ def test_the_calibration_error_is_of_answers_that_are_true():
     found = calibration(some)
     assert found["expected_calibration_error"] == pytest.approx(0.4)
     assert found["brier"] == pytest.approx((0.01 + 0.81 + 0.16 + 0.16) / 4)
+
+
+@pytest.mark.parametrize(
+    ("sets", "tried"),
+    [
+        ([["slack/smooth", "aging"], ["drift"]], True),
+        ([["slack"], ["slack", "aging", "drift"]], False),
+        ([], False),
+        (None, None),
+    ],
+)
+def test_a_truth_that_was_never_tried_is_told_from_one_that_was_not_chosen(sets, tried):
+    key = {"category": "two", "effects": ["aging", "slack"], "size_over_noise": {}, "held_out": "r3"} | {
+        "truth_error_over_noise": {"r3": 1.0}
+    }
+    result = {"verdict": "unexplained"} | ({} if sets is None else {"sets": [{"effects": s} for s in sets]})
+    m = mark("m", key, result)
+    assert m.tried is tried
+    rates = untold("pair", [m])
+    if tried is not None:
+        assert rates["pair: the truth was never tried"]["share"] == (0.0 if tried else 1.0)
+        assert rates["pair: the truth was tried and not chosen"]["share"] == (1.0 if tried else 0.0)
+    else:
+        assert rates["pair: the truth was never tried"]["of"] == 0

@@ -68,6 +68,7 @@ def summary(marks: list[Mark]) -> dict:
     two = [m for m in marks if m.category == "two"]
     seen = [m for m in one if m.size >= VISIBLE]
     pairs = [m for m in two if m.size >= VISIBLE]
+    three = [m for m in marks if m.category == "three"]
     nulls = [m for m in marks if m.category == "none"]
     strange = [m for m in marks if m.category == "unknown"]
     rates = {
@@ -83,7 +84,9 @@ def summary(marks: list[Mark]) -> dict:
         "all singles: right and no other": rate(one, lambda m: m.exact),
         "pair, both above 3 noise: both named": rate(pairs, lambda m: m.all_named),
         "pair, both above 3 noise: both and no other": rate(pairs, lambda m: m.exact),
-        "three: all named": rate([m for m in marks if m.category == "three"], lambda m: m.all_named),
+        "three: all named": rate(three, lambda m: m.all_named),
+        **untold("pair, both above 3 noise", pairs),
+        **untold("three", three),
         "nulls: false alarm": rate(nulls, lambda m: not m.right),
         "nulls, white noise: false alarm": rate([m for m in nulls if not m.correlated], lambda m: not m.right),
         "nulls, correlated noise: false alarm": rate([m for m in nulls if m.correlated], lambda m: not m.right),
@@ -100,6 +103,15 @@ def summary(marks: list[Mark]) -> dict:
         "confusion": confusion(marks),
         "by_size": by_size(marks),
         "calibration": calibration(marks),
+    }
+
+
+def untold(what: str, marks: list[Mark]) -> dict[str, dict]:
+    """Why effects were not all named: the very set was never tried, or was tried and not chosen."""
+    known = [m for m in marks if m.tried is not None]
+    return {
+        f"{what}: the truth was never tried": rate(known, lambda m: not m.tried),
+        f"{what}: the truth was tried and not chosen": rate(known, lambda m: m.tried and not m.exact),
     }
 
 

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from tissuejax.challenge.places import agreement, stated
-from tissuejax.challenge.verdicts import SETTLED, names_in
+from tissuejax.challenge.verdicts import SETTLED, names_in, tried
 
 NO_PROCESS = ("energy-form", "specimen-scatter")  # claim no process in tissue or rig; reported apart on a rest alone
 FACTOR = 1.5  # within which the size of a rest counts as right
@@ -78,9 +78,6 @@ def mark_rest(name: str, key: dict, result: dict, seconds: float = math.nan, kep
     best = named or names_in(result.get("best_attempt"))
     allowed = set(truth) | set(key["tolerated"]) | (set() if truth else set(NO_PROCESS))
     wrong = tuple(n for n in named if n not in allowed)
-    tried = None
-    if isinstance(result.get("sets"), list):
-        tried = any({k.split("/")[0] for k in s["effects"]} == set(truth) for s in result["sets"])
     recordings, phases = stated(result.get("located") or ())
     a, b = agreement(key["where"]["recordings"], recordings), agreement(key["where"]["phases"], phases)
     confidence = result.get("confidence")
@@ -104,7 +101,7 @@ def mark_rest(name: str, key: dict, result: dict, seconds: float = math.nan, kep
         wrong=wrong,
         right=verdict != "failed" and not wrong and set(truth) <= set(named),
         apt=apt,
-        tried=tried,
+        tried=tried(truth, result),
         rest_over_true=rest_size(result) / true_size(key),
         where=(a[0] + b[0], a[1] + b[1], a[2] + b[2]),
         confidence=float(confidence) if isinstance(confidence, int | float) else math.nan,

@@ -1,6 +1,7 @@
 """One case's answer held against its key: what was right, what was wrong, and the error on the held-out recording."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +29,7 @@ class Mark:
         right: what this category asks for: nothing, the exact set, or abstention.
         apt: whether the answer as such is true, which is what its stated probability is of: "found-in-part" of some of
             the effects, or of all where the laws are others than the catalogue's; "ambiguous" with the truth offered.
+        tried: whether a set with exactly these effects was fitted; None where none act, or no sets are listed.
         held_out_ratio: rms error on the held-out recording over that of the truth itself; nan if not reported.
         confidence: as stated, or nan.
         seconds: wall time.
@@ -49,6 +51,7 @@ class Mark:
     open_right: bool
     right: bool
     apt: bool
+    tried: bool | None
     held_out_ratio: float
     confidence: float
     seconds: float
@@ -67,6 +70,14 @@ def names_in(found: object) -> tuple[str, ...]:
         return names_in(inner)
     flat = [name for item in (found or ()) for name in names_in(item)]
     return tuple(dict.fromkeys(flat))
+
+
+def tried(truth: Sequence[str], result: dict) -> bool | None:
+    """Whether a set with exactly these effects was fitted; None where the result doesn't list its sets."""
+    if not isinstance(result.get("sets"), list):
+        return None
+    fitted = ({ALIKE.get(n, n) for n in (k.split("/")[0] for k in s["effects"])} for s in result["sets"])
+    return any(names == set(truth) for names in fitted)
 
 
 def held_out_ratio(key: dict, result: dict) -> float:
@@ -133,6 +144,7 @@ def mark(name: str, key: dict, result: dict, seconds: float = math.nan) -> Mark:
         open_right=exact or ambiguous,
         right=right,
         apt=apt,
+        tried=tried(truth, result) if truth and category != "unknown" else None,
         held_out_ratio=held_out_ratio(key, result),
         confidence=_number(result.get("confidence")),
         seconds=seconds,
