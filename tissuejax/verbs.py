@@ -10,6 +10,7 @@ itself.
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,9 @@ import jax
 
 from tissuejax.energies import catalogue as names
 from tissuejax.energies.energy import Energy
+from tissuejax.errors import InputError
 from tissuejax.experiments.predictor import predictor
+from tissuejax.fitting.first import first as first_model
 from tissuejax.fitting.least_squares import fit as fit_problem
 from tissuejax.fitting.options import Objective, Search, Unknowns
 from tissuejax.fitting.probed import fit_probed
@@ -81,6 +84,7 @@ def fit(
     unknowns: Unknowns | None = None,
     objective: Objective | None = None,
     search: Search | None = None,
+    first: str | os.PathLike | None = None,
     progress: Progress | None = None,
 ) -> Fit:
     """Estimate the parameters of a strain energy (and effects) from the recordings of a sample.
@@ -92,6 +96,8 @@ def fit(
         unknowns: what is estimated, from where, within which limits.
         objective: what a unit of misfit means.
         search: method, number of starts and steps.
+        first: for probings, the file of a surrogate (`tissuejax precompute`): it is fitted to the forces first, which
+            takes seconds, and the simulations begin where it ends.
         progress: told after every accepted step.
 
     Probings are fitted by `fitting.probed.fit_probed` (forward-mode least squares): from one start, whatever
@@ -113,6 +119,14 @@ def fit(
         energy = Model(energy.energy, names.volumetric("quadratic"), energy.effects)
     search, start = search or Search(), (unknowns or Unknowns()).start
     posed = problem(predictor(energy, sample, fitted), unknowns, objective)
+    begun = None
+    if first is not None:
+        if not probing:
+            raise InputError(f"first model {first}: surrogates are of probings, {', '.join(fitted)} are not")
+        from tissuejax.surrogate import store
+
+        begun = first_model(posed, store.read(first), start or {})
+        posed = replace(posed, start=dict(posed.start) | begun.start)
     with (progress or Silent()).stage(f"fitting {energy.energy.name} to {sample.name}", None) as stage:
         if search.method == STRESS_CURVE:
             found = fit_stress_curve(posed, holdout=held)
@@ -133,7 +147,7 @@ def fit(
                 on_accept=lambda n, chi2, values: stage.advance(note=f"chi-square {chi2:.4g}"),
             )
     found.warnings.extend(f"Look at the data: {sentence}." for sentence in slips(sample, (*fitted, *held)))
-    return found
+    return found if begun is None else replace(found, first=begun)
 
 
 def diagnose(

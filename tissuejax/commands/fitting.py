@@ -10,7 +10,9 @@ from tissuejax import verbs
 from tissuejax.commands.arguments import add_fit, add_model, fit_options
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.outputs import add_out, folder, made, refuse_other
+from tissuejax.errors import InputError
 from tissuejax.fitting.advice import suspect
+from tissuejax.fitting.first import First
 from tissuejax.fitting.result import Fit, described
 from tissuejax.model import Model
 from tissuejax.progress import for_terminal
@@ -42,6 +44,8 @@ into --out: result.json (every number), report.html (one page to read and keep) 
   tissuejax fit probing.h5 --energy reduced-polynomial-2 --holdout r3        force and markers of probings together
   tissuejax fit skin.toml --energy demiray+fibre --fix "energy.kappa=0.1" --bounds "energy.k2=0:50"
 
+  tissuejax fit organ.h5 --energy reduced-polynomial-2 --first organ.play.h5     a surrogate first, then simulations
+
 A fit of probings simulates, so it takes minutes; killed, it goes on from its last iterate when the same command is
 given again (--out holds checkpoint.json until it has ended). All recordings share one material; --only NAME fits one
 site.
@@ -59,19 +63,25 @@ misfit of several times the noise. With 3 and 4 what was found is written all th
         )
         add_model(parser)
         add_fit(parser)
+        parser.add_argument(
+            "--first", metavar="FILE", help="for probings: fit this surrogate (`precompute`) first and begin there"
+        )
         parser.add_argument("--each", action="store_true", help="fit every sample of FILE for itself, numbers only")
         add_out(parser, "out/SAMPLE-fit-ENERGY, with --each out/FILE-fits-ENERGY")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Read, fit, write."""
         if given.each:
+            if given.first is not None:
+                raise InputError("--first with --each: a surrogate is of one sample; fit its file alone")
             return self._each(given)
         sample = read(given.file)
         model = verbs.material(
             given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
         ).across(tuple(sample.recordings))
         out = folder(given.out, "fit", sample.name, _named(model), given.force)
-        found = verbs.fit(sample, model, progress=for_terminal(), **fit_options(given, model.parameters, out / KEPT))
+        options = fit_options(given, model.parameters, out / KEPT)
+        found = verbs.fit(sample, model, first=given.first, progress=for_terminal(), **options)
         return reply(found, verbs.write(found, out))
 
     def _each(self, given: argparse.Namespace) -> Reply:
@@ -109,6 +119,14 @@ misfit of several times the noise. With 3 and 4 what was found is written all th
         return Reply({"fits": rows, "table": str(table)}, f"{outcome}; table {table}", code)
 
 
+def begun(first: First) -> str:
+    """Where a surrogate led, in a line."""
+    rms = first.force_rms
+    said = f"began where a surrogate led: moduli {first.factor:.3g} times the tabulated, force of "
+    said += f"{', '.join(first.used)} off by {1e3 * rms['after']:.3g} mN (tabulated {1e3 * rms['before']:.3g})"
+    return said + (f"; outside its box {', '.join(first.left_out)}" if first.left_out else "")
+
+
 def _named(model: Model) -> list[str]:
     """Energy and effects, for the name of a folder."""
     return [described(model)["name"], *(e.name for e in model.effects)]
@@ -130,6 +148,7 @@ def reply(found: Fit, written: dict[str, Path]) -> Reply:
     if found.shear_moduli:
         at_once, left = found.shear_moduli.values()
         lines += ["", f"  shear modulus: instantaneous {at_once:.4g} Pa, long-term {left:.4g} Pa"]
+    lines += ["", f"  {begun(found.first)}"] if found.first else []
     lines.append("")
     lines += [f"  {e['key']:<40}{e['kind']:<10}RMSE {e['rmse']:<12}R2 {e['r2']}" for e in sentences.errors(found)[:40]]
     lines += ["", *(f"  ! {warning}" for warning in found.warnings)] if found.warnings else []

@@ -13,6 +13,7 @@ from tissuejax.cache import source
 from tissuejax.energies.catalogue import forms_of, name_of
 from tissuejax.energies.stability import Stability
 from tissuejax.fitting.fingerprint import fingerprint
+from tissuejax.fitting.first import First
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.scores import Score
 from tissuejax.fitting.uncertainty import Uncertainty
@@ -58,6 +59,7 @@ class Fit:
             start and at the end ("before", "after"; Lister 2012, eq. 2.2 and 2.3).
         curve_std: for probings, standard deviation of the predicted curves of the fitted recordings by recording and
             channel, SI (`bands`); of material tests it is computed when it is drawn.
+        first: where it began, if a surrogate was asked first (`fitting.first`).
     """
 
     problem: Problem
@@ -78,6 +80,7 @@ class Fit:
     method: str = "levenberg-marquardt"
     sites: Mapping[str, Mapping[str, Mapping[str, float]]] = field(default_factory=dict)
     curve_std: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
+    first: First | None = None
 
     @property
     def converged(self) -> bool:
@@ -184,6 +187,7 @@ class Fit:
             "channels": {key: s.record() for key, s in self.channels.items()},
             "holdout": {key: s.record() for key, s in self.holdout.items()},
             **({"sites": self.sites} if self.sites else {}),
+            **({"first": self.first.record()} if self.first else {}),
             **({"numerics": checks} if (checks := self.numerics) else {}),
             "warnings": list(self.warnings),
             "starts": self.starts,

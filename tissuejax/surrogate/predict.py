@@ -37,6 +37,19 @@ def force_along(surrogate: Surrogate, clock: Float[Array, " n"], path: Float[Arr
     return jax.lax.cond(gives, lambda f: jax.lax.fori_loop(0, GIVE, again, f), lambda f: f, first)
 
 
+def within_box(surrogate: Surrogate, recording: Recording) -> tuple[Float[Array, " n"], Float[Array, "n 3"]]:
+    """Times of evaluation, s, and where the ball truly was, m.
+
+    Raises:
+        InputError: a path that leaves the box the surrogate was made for.
+    """
+    time, path = smooth_path(recording, SMOOTHING)
+    clock = jnp.arange(time[0], time[-1] + CLOCK, CLOCK)
+    true = true_path(surrogate, jnp.asarray(time), jnp.asarray(path), clock)
+    _refuse_outside(surrogate, recording.name, np.asarray(true))
+    return clock, true
+
+
 def predicted(surrogate: Surrogate, recording: Recording, lobe: Lobe | None = None) -> Recording:
     """What the sensors of a probing would report; markers too where the organ's map is given.
 
@@ -47,20 +60,17 @@ def predicted(surrogate: Surrogate, recording: Recording, lobe: Lobe | None = No
     Raises:
         InputError: a path that leaves the box the surrogate was made for.
     """
-    time, path = smooth_path(recording, SMOOTHING)
-    clock = np.arange(time[0], time[-1] + CLOCK, CLOCK)
-    true = true_path(surrogate, jnp.asarray(time), jnp.asarray(path), jnp.asarray(clock))
-    _refuse_outside(surrogate, recording.name, np.asarray(true))
-    force = force_along(surrogate, jnp.asarray(clock), true)
+    clock, true = within_box(surrogate, recording)
+    force = force_along(surrogate, clock, true)
     channels = {}
     for name, channel in recording.channels.items():
         at = jnp.asarray(np.asarray(channel.time, float))
         if name == "force":
-            channels[name] = Channel(channel.time, read_at(at, jnp.asarray(clock), force), channel.unit)
+            channels[name] = Channel(channel.time, read_at(at, clock, force), channel.unit)
         elif name == "markers" and lobe is not None:
             rest = np.nanmedian(np.asarray(channel.values, float)[: max(5, len(channel.time) // 50)], axis=0)
             where = np.array([lobe.parameters_of(p[:2]) if np.isfinite(p).all() else (0.5, 0.5) for p in rest])
-            moved = markers_along(surrogate, read_at(at, jnp.asarray(clock), true), jnp.asarray(where))
+            moved = markers_along(surrogate, read_at(at, clock, true), jnp.asarray(where))
             channels[name] = Channel(channel.time, rest + moved, channel.unit)
     return Recording(recording.name, recording.experiment, recording.inputs, channels, recording.attributes)
 
