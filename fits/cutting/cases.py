@@ -1,5 +1,6 @@
 """The parts of the study: each builds its scenes, runs them and compares with algebra or a published number."""
 
+import runpy
 import sys
 import time
 from pathlib import Path
@@ -173,6 +174,11 @@ def beam() -> dict:
                         "expected_mN": 1e3 * expected, "error_percent": 100 * (force / expected - 1),
                         "peak_mN": 1e3 * float(P[5:].max())})  # fmt: skip
     return {"runs": out}
+
+
+def separation() -> dict:
+    """See `separation.py`."""
+    return runpy.run_path(str(Path(__file__).with_name("separation.py")))["separated"]()
 
 
 NAMES = ("faces.values.strength", "faces.values.energy", "probe.friction", "probe.shape.rounding")

@@ -52,7 +52,8 @@ BREACHES = {
     "the same twice": (ROWS, UNI + '[[part]]\n[[part]]\nrecording = "r2"', ["r1", "r2", "identical data"]),
     "binary table": ("t,l,P\n\0\0\0", UNI, ["binary"]),
     "lowpass": (ROWS, UNI.replace("[columns]", 'lowpass = "5 Hz"\n[columns]'), ["cutoff 5 Hz", "2 samples a second"]),
-    "cutting": (ROWS, UNI.replace("uniaxial", "cutting"), ["cutting", "recording files only"]),
+    "cutting without a body": (ROWS, UNI.replace("uniaxial", "cutting"), ["tissue.length"]),
+    "blade of a tension test": (ROWS, UNI + '[blade]\nthickness = "0.4 mm"', ["[blade]", "uniaxial"]),
 }
 
 

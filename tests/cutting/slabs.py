@@ -119,3 +119,29 @@ def peeled(energy: float, youth: float, thick: float, seconds: float = 12.0, h: 
     notch = (middle < 0.015).astype(float)
     scene = _apart(made, held, lambda t: far * t / seconds, seconds, 240, values, youth / 3, notch=notch)
     return scene, lambda t: far * t / seconds
+
+
+EDGE = (0.15, -6.0)  # x = 0.15 z - 6 z^2 (m): an edge that leans back by 9 degrees at the tip and turns upright
+
+
+def drawn(h=1e-3, length=0.014, half=0.004, height=0.008, friction=0.1, travel=0.012, frames=40):
+    """A blade with a curved edge goes into a block at a slant, from 3 to 5 mm deep, above tissue that stays whole:
+    draw angle, depth that varies along the path, and a blind cut; and where its tip is at every frame's end."""
+    up = np.arange(round(height / h) + 1) * h
+    body = block(np.arange(round(length / h) + 1) * h, across(half, h), up, "base")
+    made = split(body, lambda p: p[:, 1], within=lambda p: p[:, 2] > height - 5e-3)
+    end = travel / 0.05
+    scene = build.scene(
+        made.geometry,
+        build.Tissue(NeoHookean(), Quadratic(), {"mu": MU}, {"K": 2e4}, 1000.0),
+        (np.arange(frames) + 0.5) * end / frames,
+        numerics=build.Numerics(mass_damping=20.0, hourglass=seam.HOURGLASS),
+        joined=seam.pairs(made),
+    )
+    scene = seam.joined(scene, made, law("bilinear"), {"strength": 3000.0, "energy": 2.0})
+    slope = float(np.tan(np.radians(15)))
+    blade = Wedge(2e-3, slope, seam.shoulder(2e-3, slope, h), profile=EDGE, height=8e-3, bottom=5e-4)
+    tip = np.array([[-2e-3, 0, height - 3e-3], [-2e-3 + travel, 0, height - 5e-3]])
+    scene = seam.armed(scene, made, blade, np.array([0, end]), tip, friction=friction)
+    share = (np.arange(frames) + 1) / frames
+    return scene, tip[0] + share[:, None] * (tip[1] - tip[0])

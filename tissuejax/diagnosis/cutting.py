@@ -10,6 +10,8 @@ modulus (`tissuejax cut fit` with the measured one gives the number).
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -18,29 +20,36 @@ from jaxtyping import Float
 
 from tissuejax.cohesion.catalogue import law
 from tissuejax.diagnosis.bench import Bench, Candidate, Free, Segment
+from tissuejax.diagnosis.cutting_discrepancy import MAP
 from tissuejax.diagnosis.next_cut import next_cut
 from tissuejax.effects.catalogue import effects, suited
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.volumetric import Quadratic
 from tissuejax.errors import unknown
-from tissuejax.experiments.cutting_record import FORCE, steady
+from tissuejax.experiments.cutting import balance_force
+from tissuejax.experiments.cutting_layers import ages, layer
+from tissuejax.experiments.cutting_record import FORCE, Path, steady
 from tissuejax.experiments.predictor import predictor
 from tissuejax.model import Model
-from tissuejax.recordings.recording import Sample
+from tissuejax.parameters import under
+from tissuejax.recordings.recording import Channel, Sample
 
 BASE = ("cohesion.energy", "effects.onset.longer", "volumetric.K")
 STIFF = 10.0  # bulk over shear modulus where the tissue is not known
+FORMS = {"viscoelasticity": {"terms": 1}, "toughness-map": {"knots": 12}, "cutting-drift": {"separate": True}}
 WEDGING = 0.05  # share of the force that the modulus gives to wedging at the start
 
 
 class CuttingBench(Bench):
-    """Cuts of one sample; see `Bench`."""
+    """Cuts of one sample; see `Bench`. `fresh`: by recording, the share of the motion that parts new tissue."""
 
     @classmethod
     def of(
-        cls, sample: Sample, energy: Energy, fitted: tuple[str, ...], held_out: tuple[str, ...], names=None
+        cls, sample: Sample, energy: Energy, fitted: tuple[str, ...], held_out: tuple[str, ...], names=None, like=None
     ) -> "CuttingBench":
         """The bench of `sample` with base model `energy`; `names`: effects to try, all of cutting by default.
+
+        `like`: a bench of the same sample and effects with other recordings held out.
 
         Raises:
             InputError: an unknown effect, or recordings that can't be cut (see `experiments.cutting_record`).
@@ -49,11 +58,11 @@ class CuttingBench(Bench):
         for name in names or ():
             if name not in known:
                 raise unknown("effect of cutting", name, known)
-        tried = [suited(n, "cutting") for n in known if not names or n in names]
+        tried = [suited(n, "cutting", **FORMS.get(n, {})) for n in known if not names or n in names]
         model = Model(energy, Quadratic(), (suited("onset", "cutting"), *tried), cohesion=law("bilinear"))
-        p = predictor(model, sample, (*fitted, *held_out))
+        p = predictor(model, sample, (*fitted, *held_out)) if like is None else like._p
         segments, ys, sigmas, at, kept = [], [], [], 0, {}
-        for name in p.names:
+        for name in (*fitted, *held_out):
             seen, path = p.sample.recordings[name].channels[FORCE], p.paths_of[name]
             kept[name] = np.flatnonzero(steady(path, np.asarray(seen.time, float)))
             y, time = np.asarray(seen.values, float)[kept[name]], np.asarray(seen.time, float)[kept[name]]
@@ -72,16 +81,24 @@ class CuttingBench(Bench):
         free["cohesion.energy"] = Free(1e-3 * top, 1e2 * top, 0.1, "J/m^2", log=True)
         K = start["volumetric.K"]
         free["volumetric.K"] = Free(1e-4 * K, 1e2 * K, 0.3, "Pa", log=True)
-        candidates = {
-            e.name: Candidate(
-                e.name, tuple(f"effects.{e.name}.{a}" for a in e.amplitudes),
-                tuple(f"effects.{e.name}.{k}" for k in e.grid),
-                tuple({f"effects.{e.name}.{k}": v for k, v in s.items()} for s in e.settings(1.0)) or ({},),
-            )
-            for e in tried
-        }  # fmt: skip
+        candidates = {c.key: c for e in tried for c in _forms(e, fitted)}
+        for c in candidates.values():
+            for q in c.amplitudes:
+                if q not in free:  # of each stroke's own
+                    free[q], start[q] = free[q.rsplit(".", 1)[0]], 0.0
         bench = cls(segments, y, np.concatenate(sigmas), fitted, held_out, BASE, free, start, candidates)
-        bench._p, bench._order, bench._programs, bench._kept = p, list(declared), {}, kept
+        bench._p, bench._order, bench._kept = p, list(declared), kept
+        plain = p.model.across(())
+        bench._key = repr(plain)
+        _models.setdefault(bench._key, plain)
+        if like is None:
+            seen = {n: np.asarray(p.sample.recordings[n].channels[FORCE].time, float) for n in p.names}
+            ways = {n: Path(*(np.asarray(x) for x in p.paths_of[n])) for n in p.names}
+            bench._paths = {n: (ways[n], ages(ways[n]), seen[n]) for n in p.names}
+        else:
+            bench._paths = like._paths
+        clocks = {s.recording: s.time for s in segments}
+        bench.fresh = {n: np.interp(clocks[n], w.time, w.fresh * (w.speed > 0)) for n, w in p.paths_of.items()}
         bench.warnings.append(
             "the tissue's modulus is not in a cut: a friction coefficient is relative to an assumed one"
         )
@@ -89,28 +106,60 @@ class CuttingBench(Bench):
 
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:
         """See `Bench.predict`."""
-        return self._rows(values, recordings, "run", lambda name: lambda v: self._p.force(name, v)[0], (len(self.y),))
+        return self._rows(values, recordings, _force, (len(self.y),))
 
     def jacobian(
         self, values: Mapping[str, float], paths: Sequence[str], recordings: Sequence[str] | None = None
     ) -> Float[np.ndarray, "N k"]:
         """See `Bench.jacobian`."""
         shape = (len(self.y), len(self._order))
-        make = lambda name: jax.jacfwd(lambda v: self._p.force(name, v)[0])  # noqa: E731
-        whole = self._rows(values, recordings, "slope", make, shape)
-        return whole[:, [self._order.index(q) for q in paths]]
+        whole = self._rows(values, recordings, _slopes, shape)
+        out = np.zeros((len(self.y), len(paths)))
+        for s in self.segments:
+            for k, path in enumerate(paths):
+                source = path if path in self._order else path.rsplit(".", 1)[0]
+                theirs = path == source and self._own(source, s.recording) not in values
+                if theirs or path == self._own(source, s.recording):
+                    out[s.rows, k] = whole[s.rows, self._order.index(source)]
+        return out
 
-    def _rows(self, values, recordings, kind, make, shape):
-        vector = jnp.array([float(values.get(q, self.start[q])) for q in self._order])
+    def _own(self, path: str, recording: str) -> str:
+        """What a parameter is called where a stroke has one for itself."""
+        return f"{path}.{recording}"
+
+    def _vector(self, values: Mapping[str, float], recording: str) -> Float[np.ndarray, " p"]:
+        """What counts in a recording: its own value, the common one, or neutral."""
+        return np.array([float(values.get(self._own(q, recording), values.get(q, self.start[q]))) for q in self._order])
+
+    def _rows(self, values, recordings, of, shape):
         out = np.zeros(shape)
         for s in self.segments:
             if recordings is None or s.recording in recordings:
-                key = (s.recording, kind)
-                if key not in self._programs:
-                    self._programs[key] = jax.jit(make(s.recording))
-                out[s.rows] = np.asarray(self._programs[key](vector))[self._kept[s.recording]]
-        self.spent += 1.0 if kind == "run" else 10.0
+                vector = jnp.asarray(self._vector(values, s.recording))
+                found = of(self._key, vector, *self._paths[s.recording])
+                out[s.rows] = np.asarray(found)[self._kept[s.recording]]
+        self.spent += 1.0 if of is _force else 10.0
         return out
+
+
+_models: dict[str, Model] = {}  # by their description: one program serves all benches of a model and a length
+
+
+@partial(jax.jit, static_argnums=0)
+def _force(key: str, vector, path, since, time):
+    """Force at the sensor's times from a vector of declared values."""
+    model = _models[key]
+    values = dict(zip(model.declared, vector, strict=True))
+    channels = {FORCE: Channel(path.time, balance_force(model, values, path, since), "N")}
+    for effect in reversed(model.ordered):
+        channels = effect.channels(under(f"effects.{effect.name}", values), None, channels)
+    return jnp.interp(time, channels[FORCE].time, channels[FORCE].values)
+
+
+@partial(jax.jit, static_argnums=0)
+def _slopes(key: str, vector, path, since, time):
+    """Its derivative by the vector."""
+    return jax.jacfwd(lambda v: _force(key, v, path, since, time))(vector)
 
 
 def strokes_to_settle(sample: Sample, bench: CuttingBench, verdict) -> list[str]:
@@ -128,6 +177,20 @@ def strokes_to_settle(sample: Sample, bench: CuttingBench, verdict) -> list[str]
     ]
 
 
+def _forms(e, strokes: tuple[str, ...]) -> list[Candidate]:
+    """An effect as the bench tries it: alike in all strokes, and where a stroke may have its own, so too."""
+    paths = {a: f"effects.{e.name}.{a}" for a in (*e.amplitudes, *e.grid)}
+    grid = tuple({paths[k]: v for k, v in s.items()} for s in e.settings(1.0)) or ({},)
+    alike = Candidate(e.name, tuple(paths[a] for a in e.amplitudes), tuple(paths[k] for k in e.grid), grid)
+    other = []
+    if e.name == MAP.name:
+        other.append(MAP)
+    elif any(d.each for d in e.parameters) and len(strokes) > 1:
+        several = tuple(f"{paths[a]}.{r}" for r in strokes for a in e.amplitudes)
+        other.append(replace(alike, amplitudes=several, form=MAP.form))
+    return [replace(alike, beside=tuple(c.key for c in other)), *(replace(c, beside=(alike.key,)) for c in other)]
+
+
 def _free(declared) -> Free:
     return Free(declared.lower, declared.upper, declared.typical, declared.unit)
 
@@ -135,8 +198,6 @@ def _free(declared) -> Free:
 def _modulus(model: Model, p, wedging: float) -> dict[str, float]:
     """Moduli of the energy scaled so that wedging makes `wedging` of the force per depth, N/m, at a bulk modulus of
     `STIFF` shear moduli."""
-    from tissuejax.experiments.cutting import layer
-
     path = next(iter(p.paths_of.values()))
     values = {q: float(d.default) for q, d in model.declared.items()}
     moduli = [q for q, d in model.declared.items() if q.startswith("energy.") and d.unit == "Pa"]
@@ -146,5 +207,5 @@ def _modulus(model: Model, p, wedging: float) -> dict[str, float]:
         )
     )
     values["volumetric.K"] = STIFF * shear
-    scale = wedging / max(float(layer(model, values, path.half, path.thickness)[0]), 1e-12)
+    scale = wedging / max(float(layer(model, values, path.half, path.thickness).energy), 1e-12)
     return {q: values[q] * scale for q in (*moduli, "volumetric.K")}

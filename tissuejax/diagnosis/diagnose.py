@@ -12,9 +12,10 @@ from threadpoolctl import threadpool_limits
 from tissuejax.cache.crowding import make_room
 from tissuejax.cache.programs import keep_programs
 from tissuejax.diagnosis.cutting import CuttingBench, strokes_to_settle
+from tissuejax.diagnosis.cutting_discrepancy import cutting_discrepancy
 from tissuejax.diagnosis.foreseen import OPEN, foreseen
 from tissuejax.diagnosis.judgement.answer import Answered, answer, evidence_file
-from tissuejax.diagnosis.judgement.blocks import blocks, driven_states, series
+from tissuejax.diagnosis.judgement.blocks import blocks, series
 from tissuejax.diagnosis.judgement.evidence import write_evidence
 from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.judgement.judge import Kind
@@ -124,7 +125,8 @@ def diagnose(
         whole, bench = ProbingView.of(own), ProbingView.of(narrow)
         effort = effort or PROBING
     elif kind == "cutting":
-        bench, whole = (CuttingBench.of(sample, base, f, h, tried) for f, h in ((fitted, held_out), (every, ())))
+        whole = CuttingBench.of(sample, base, every, (), tried)
+        bench = CuttingBench.of(sample, base, fitted, held_out, tried, whole)
         for b in (bench, whole):
             tell(b, physics)
     else:
@@ -160,11 +162,13 @@ def diagnose(
             own.runs.report = ran
             cut = probing_blocks(whole)
             of = probing_discrepancy(whole, cut)
+        elif kind == "cutting":
+            cut = blocks(whole)
+            of = cutting_discrepancy(whole, cut, whole.fresh)
         else:
             cut = blocks(whole)
-            states = strain_states(whole) if kind == "homogeneous" else driven_states(whole)
-            changing = kind == "homogeneous" and paced(sample)
-            of = discrepancy(series(whole, cut, states), cut.spread(whole.sigma), changing, kind == "homogeneous")
+            states = strain_states(whole)
+            of = discrepancy(series(whole, cut, states), cut.spread(whole.sigma), paced(sample), at_once=True)
         found = answer(bench, whole, cut, of, effort, noted)
         made = {"homogeneous": _material, "probing": _probing, "cutting": _cutting}[kind](sample, energy, base, found)
     if found.evidence.exhausted:

@@ -1,5 +1,7 @@
 """A cut as effects see it: what the blade meets at each station along its path."""
 
+import dataclasses
+
 import equinox as eqx
 from jaxtyping import Array, Float
 
@@ -14,6 +16,8 @@ class Cut(eqx.Module):
         energy: toughness, J/m^2. strength: Pa. depth: in which the blade cuts there, m.
         friction: Coulomb coefficient between blade and tissue.
         onset: length over which the force sets in at the entry, m; only in a force balance, a simulation has its own.
+        compliance: of the rig that holds the blade, m/N; None for a stiff one.
+        relaxing: shares of the isochoric stress that relax, and their times (s); None for elastic tissue.
     """
 
     at: Float[Array, " P"]
@@ -25,8 +29,9 @@ class Cut(eqx.Module):
     depth: Float[Array, " P"]
     friction: Float[Array, ""]
     onset: Float[Array, ""]
+    compliance: Float[Array, ""] | None = None
+    relaxing: tuple[Float[Array, " m"], Float[Array, " m"]] | None = None
 
     def with_(self, **changes) -> "Cut":
         """A copy with fields replaced."""
-        names = list(changes)
-        return eqx.tree_at(lambda cut: [getattr(cut, n) for n in names], self, [changes[n] for n in names])
+        return dataclasses.replace(self, **changes)

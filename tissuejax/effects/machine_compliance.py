@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from tissuejax.effects.cutting_test import Cut
 from tissuejax.effects.effect import Effect, Respond
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.effects.probing_test import ProbingTest
@@ -19,18 +20,22 @@ class MachineCompliance(Effect):
 
     Force is P area and the rig's displacement compliance times force, a share of the height. Solved by four Newton
     steps with the slope of P under a shift of the whole history (exact for an elastic specimen). An unknown area or
-    height counts as a cube of 1 cm edge.
+    height counts as a cube of 1 cm edge. In a cut the blade stands compliance * force behind where it was driven to.
+    Neutral: compliance 0.
 
     Revealed by stiffness that falls with load, alike in tension and compression, and by specimens of unlike size that
-    disagree. Blind: one specimen in one mode: it then looks like another energy (or slack).
+    disagree; in cuts by a deeper one that sets in later. Blind: one specimen in one mode: it then looks like another
+    energy (or slack); cuts of one depth, where it is a longer way to set in.
     Source: Kalidindi, Abusafieh and El-Danaf 1997, Exp. Mech. 37 (compliance of test machines).
     """
 
     name: ClassVar[str] = "machine-compliance"
-    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing", "cutting"})
     remembers: ClassVar[bool] = False
-    reveals: ClassVar[str] = "apparent stiffness that falls with load; specimens of unlike size disagree"
-    blind: ClassVar[str] = "one specimen in one mode"
+    reveals: ClassVar[str] = (
+        "apparent stiffness that falls with load; specimens of unlike size disagree; deeper cuts set in later"
+    )
+    blind: ClassVar[str] = "one specimen in one mode; cuts of one depth"
     words: ClassVar[tuple[str, ...]] = ("the rig gives way by {compliance}",)
     needs: ClassVar[str] = "unlike"
     source: ClassVar[str] = "Kalidindi, Abusafieh and El-Danaf 1997"
@@ -66,3 +71,6 @@ class MachineCompliance(Effect):
 
     def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
         return scene.put({"probe.compliance": p["compliance"]})
+
+    def cut(self, p: Mapping[str, Array], cut: Cut) -> Cut:
+        return cut.with_(compliance=jnp.asarray(p["compliance"]))

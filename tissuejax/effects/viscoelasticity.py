@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from tissuejax.effects.cutting_test import Cut
 from tissuejax.effects.effect import Effect
 from tissuejax.effects.history import fading
 from tissuejax.effects.material_test import MaterialTest, Stress
@@ -27,17 +28,20 @@ class Viscoelasticity(Effect):
     relaxes, P(t) = P_e(t) - sum_i g_i (P_e - h_i), as in Fung's own quasi-linear law of a tension test; a probing
     knows the first law alone. The energy's moduli are INSTANTANEOUS ones; the long-term stress is (1 - sum_i g_i) of
     it (`long_term`). A recording starts from rested tissue. `terms` relaxation times lie, to start with, in equal
-    parts of the decades from `shortest` to `longest` seconds.
+    parts of the decades from `shortest` to `longest` seconds. In a cut it is the layers beside the blade that relax.
+    Neutral: all shares 0.
 
-    Revealed by force falling during holds, by hysteresis between loading and unloading, by stiffness rising with rate.
-    Blind: one monotonic ramp at constant rate (it looks like another energy). Inseparable from softening in a single
+    Revealed by force falling during holds, by hysteresis between loading and unloading, by stiffness rising with rate;
+    in cuts by friction that falls with the time that the blade has been where it is, and by wedging that grows with
+    speed. Blind: one monotonic ramp at constant rate (it looks like another energy); one speed of a blade without
+    friction, whose force is nearly all toughness. Inseparable from softening in a single
     cycle without a hold. Source: Fung 1993, sec. 7.6; Simo and Hughes 1998, sec. 10.3.
     """
 
     name: ClassVar[str] = "viscoelasticity"
-    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing", "cutting"})
     reveals: ClassVar[str] = "relaxation during holds, hysteresis, stiffness that rises with rate"
-    blind: ClassVar[str] = "a single ramp at constant rate"
+    blind: ClassVar[str] = "a single ramp at constant rate; cuts with a blade that hardly rubs"
     words: ClassVar[tuple[str, ...]] = (
         "{g1:%} of the stress relaxes with {tau1}",
         "{g2:%} with {tau2}",
@@ -127,6 +131,9 @@ class Viscoelasticity(Effect):
 
     def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
         return scene.put({"tissue.prony": Prony(*self._series(p))})
+
+    def cut(self, p: Mapping[str, Array], cut: Cut) -> Cut:
+        return cut.with_(relaxing=self._series(p))
 
     def _series(self, p: Mapping[str, Array]) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
         return tuple(jnp.stack([jnp.asarray(p[f"{name}{i}"]) for i in self._numbers]) for name in ("g", "tau"))

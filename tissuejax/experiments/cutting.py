@@ -22,16 +22,16 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.effects.cutting_test import Cut
-from tissuejax.energies.strain import Strain
 from tissuejax.errors import InputError
+from tissuejax.experiments.cutting_layers import layer, relaxed
 from tissuejax.experiments.cutting_record import Path
 from tissuejax.experiments.experiment import Experiment
 from tissuejax.model import Model
 from tissuejax.parameters import under
 from tissuejax.recordings.recording import Recording
-from tissuejax.tensors import Sym
 
 ONSET = 2e-3  # m: length over which the force sets in, where nothing says otherwise
+ROUNDS = 4  # of Newton's method, of a rig that gives way
 
 
 class Cutting(Experiment):
@@ -49,21 +49,6 @@ class Cutting(Experiment):
         raise InputError(f"recording {recording.name}: a cut needs the body; use predictor(model, sample)")
 
 
-def layer(model: Model, values: Mapping[str, Array], half: float, thickness) -> tuple[Array, Array]:
-    """Energy of the two squeezed layers per area of cut, J/m^2, and the pressure on a flat, Pa."""
-    energy, bulk = under("energy", values), under("volumetric", values)
-
-    def psi(stretch):
-        one, none = jnp.ones_like(stretch), jnp.zeros_like(stretch)
-        strain = Strain.of(Sym(one, stretch**2, one, none, none, none))
-        total = model.energy.isochoric(energy, strain)
-        return total if model.volumetric is None else total + model.volumetric.energy(bulk, strain.J)
-
-    stretch = 1 - 0.5 * jnp.asarray(thickness) / half
-    value, slope = jax.value_and_grad(psi)(stretch)
-    return 2 * half * value, -slope
-
-
 def met(model: Model, values: Mapping[str, Array], path: Path, at, pace, elapsed, depth) -> Cut:
     """What the blade meets at stations along a path, all effects included."""
     one = jnp.ones_like(jnp.asarray(at, float))
@@ -79,16 +64,46 @@ def met(model: Model, values: Mapping[str, Array], path: Path, at, pace, elapsed
     return cut
 
 
-def balance_force(model: Model, values: Mapping[str, Array], path: Path) -> Float[Array, " n"]:
-    """Force against the motion at the times of the path, N, by the balance of energies."""
-    begun = float(path.time[int((path.x > 0).argmax())])
-    cut = met(model, values, path, path.front, path.speed, path.time - begun, path.depth)
-    wedge, pressure = layer(model, values, path.half, path.thickness)
-    fresh = 1 - jnp.exp(-jnp.maximum(cut.at - path.notch, 0.0) / cut.onset)
-    inside = 1 - jnp.exp(-jnp.maximum(jnp.asarray(path.x), 0.0) / cut.onset)
-    parting = path.fresh * cut.energy * fresh + wedge * inside
-    contact = jnp.clip(jnp.asarray(path.x), 0, path.length)
-    way = jnp.tanh(jnp.asarray(path.speed) / 1e-4)  # at rest the springs of friction hold what they held
-    slope, rub = jnp.tan(0.5 * path.angle), cut.friction * way
-    bevel = (1 + rub / slope) / (1 - rub * slope)
-    return cut.depth * (parting * bevel + 2 * rub * pressure * contact)
+def balance_force(
+    model: Model, values: Mapping[str, Array], path: Path, since: Float[Array, "n s"] | None = None
+) -> Float[Array, " n"]:
+    """Force against the motion at the times of the path, N, by the balance of energies. Pure JAX, of the path too.
+
+    Where the rig gives way the edge stands compliance * force behind the path (Newton's method; exact for a force that
+    follows from where the edge stands).
+
+    Args:
+        since: `cutting_layers.ages` of the path, worked out here by default (the path is then no tracer).
+    """
+    path = Path(*(jnp.asarray(x) for x in path))
+    begun = path.time[jnp.argmax(path.x > 0)]
+    layers = layer(model, values, path.half, path.thickness)
+
+    def force(x, front):
+        cut = met(model, values, path, front, path.speed, path.time - begun, path.depth)
+        wedge, pressure = layers[:2] if cut.relaxing is None else relaxed(layers, cut.relaxing, path, since)
+        fresh = 1 - jnp.exp(-jnp.maximum(cut.at - path.notch, 0.0) / cut.onset)
+        inside = 1 - jnp.exp(-jnp.maximum(jnp.asarray(x), 0.0) / cut.onset)
+        parting = path.fresh * cut.energy * fresh + wedge * inside
+        contact = jnp.clip(jnp.asarray(x), 0, path.length)
+        way = jnp.tanh(jnp.asarray(path.speed) / 1e-4)  # at rest the springs of friction hold what they held
+        slope, rub = jnp.tan(0.5 * path.angle), cut.friction * way
+        bevel = (1 + rub / slope) / (1 - rub * slope)
+        return cut.depth * (parting * bevel + 2 * rub * pressure * contact), cut.compliance
+
+    plain, compliance = force(path.x, path.front)
+    if compliance is None:
+        return plain
+
+    onward = path.x >= jax.lax.cummax(path.x)
+    farthest = jax.lax.cummax(jnp.where(onward, jnp.arange(len(path.x)), 0))
+
+    def behind(by):
+        x = path.x - by
+        return force(x, jnp.clip(jnp.maximum(x[farthest], path.notch), 0, path.length))[0]
+
+    def round_(by, _):
+        at, slope = jax.jvp(behind, (by,), (jnp.ones_like(by),))
+        return by - (by - compliance * at) / jnp.maximum(1 - compliance * slope, 0.5), None
+
+    return behind(jax.lax.scan(round_, jnp.zeros_like(plain), None, length=ROUNDS)[0])

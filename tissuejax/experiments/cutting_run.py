@@ -61,7 +61,8 @@ class CuttingSettings:
 
 
 class Slice(NamedTuple):
-    """A scene made ready for many values, the stations of its faces, and the way that the blade goes in each frame."""
+    """A scene made ready for many values, the stations of its faces, the way that the blade goes in each frame, and
+    the run's time over the record's while the blade moves (relaxation times shrink by it)."""
 
     scene: Scene
     at: Float[np.ndarray, " P"]
@@ -71,6 +72,7 @@ class Slice(NamedTuple):
     pathtime: Float[np.ndarray, " n"]
     runtime: Float[np.ndarray, " n"]
     heading: Float[np.ndarray, " m"]
+    faster: float
 
 
 class Ran(eqx.Module):
@@ -138,7 +140,9 @@ def prepare(model: Model, values: Mapping[str, float], density: float, path: Pat
     begun = path.time[int((path.x > 0).argmax())]
     clock = np.interp(path.time, path.time[:last], runtime)
     heading = np.sign(np.diff(np.interp(SPEED * end * np.arange(frames + 1) / frames, way, x)))
-    return Slice(scene, middle, path.speed[first], path.time[first] - begun, h, path.time, clock, heading)
+    moving = float(np.sum(np.diff(path.time[:last])[np.diff(way) > 1e-9]))
+    faster = end / max(moving, 1e-9)
+    return Slice(scene, middle, path.speed[first], path.time[first] - begun, h, path.time, clock, heading, faster)
 
 
 def run_slice(model: Model, values: Mapping[str, Array], ready: Slice, path: Path) -> Ran:
@@ -159,6 +163,11 @@ def run_slice(model: Model, values: Mapping[str, Array], ready: Slice, path: Pat
         if type(effect).energy is not Effect.energy:
             scene = scene.put({"tissue.added": (*scene.tissue.added, Added(effect, p))})
         scene = effect.scene(p, None, scene)
+    if cut.compliance is not None:  # of the slice: the rig feels the force of all the depth
+        share = jnp.max(jnp.asarray(path.depth)) / ready.width
+        scene = scene.put({"probe.compliance": cut.compliance * share})
+    if scene.tissue.prony is not None:
+        scene = scene.put({"tissue.prony.tau": scene.tissue.prony.tau * ready.faster})
     out = simulate(scene)
     # what mass damping took is none of a slow cut's: there is nothing to shake there
     shaken = jnp.diff(out.balance.damping, prepend=0.0) / (SPEED * scene.clock.interval)

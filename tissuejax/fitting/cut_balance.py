@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from tissuejax.effects.catalogue import effect
-from tissuejax.experiments.cutting import layer
+from tissuejax.experiments.cutting_layers import layer
 from tissuejax.experiments.cutting_predictor import CuttingPredictor
 from tissuejax.experiments.cutting_record import FORCE, drawn, path_of, steady
 from tissuejax.experiments.predictor import predictor
@@ -28,7 +28,7 @@ def by_balance(
     with_onset = model.with_effects(effect("onset"))
     free = [p for p in (ENERGY, FRICTION, ONSET) if p not in known]
     values = with_onset.defaults | dict(known) | {k: v for k, v in start.items() if k in with_onset.parameters}
-    p = predictor(with_onset, _calm(sample, names), names)
+    p = predictor(with_onset, calm(sample, names), names)
     if ENERGY not in known:  # the mean of what cuts fresh tissue, over the depth
         guess = []
         for n in names:
@@ -57,7 +57,7 @@ def by_balance(
     return CutFit(found, std, none, why, chi2, status, ended.n_evaluations, "balance", p, p.predict(found), 0.0, said)
 
 
-def _calm(sample: Sample, names: tuple[str, ...]) -> Sample:
+def calm(sample: Sample, names: tuple[str, ...]) -> Sample:
     """The sample without the samples of which a balance of energies says nothing (`cutting_record.steady`)."""
     sample = drawn(sample)
     recordings = dict(sample.recordings)
@@ -80,7 +80,7 @@ def linear(p: CuttingPredictor, values: Mapping[str, float], known: Mapping[str,
     rows, right = [], []
     for name, path in p.paths_of.items():
         seen = p.sample.recordings[name].channels[FORCE]
-        wedge, pressure = (float(q) for q in layer(p.model.across(()), values, path.half, path.thickness))
+        wedge, pressure = (float(q) for q in layer(p.model.across(()), values, path.half, path.thickness)[:2])
         bevel = 0.5 * path.thickness / np.tan(path.angle / 2)
         used = (path.x > bevel) & (path.x < path.length - bevel) & (path.depth > 0) & (np.abs(path.speed) > 1e-6)
         time = np.asarray(seen.time, float)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tissuejax.errors import InputError, unknown
+from tissuejax.recordings.cutting_table import Setup, setup_from
 from tissuejax.recordings.exports.meanings import COLUMN_WORDS, EXPERIMENT_WORDS, SIZE_WORDS
 from tissuejax.recordings.layouts import LAYOUTS
 from tissuejax.recordings.selection import Selection, selection_from
@@ -26,9 +27,12 @@ QUANTITIES = {
     "nominal_stress": "Pa",
     "true_stress": "Pa",
     "force": "N",
+    "force_z": "N",
+    "depth": "m",
 }
 KINEMATIC = tuple(QUANTITIES)[1:9]
-STRESS = tuple(QUANTITIES)[9:]
+STRESS = tuple(QUANTITIES)[9:12]
+OF_CUTS = tuple(QUANTITIES)[12:]  # beside force and displacement, in tables of cuts alone
 # These turn round where compression is counted positive.
 SIGNED = ("strain", "true_strain", "displacement", "nominal_stress", "true_stress", "force")
 SPECIMEN = {
@@ -46,7 +50,7 @@ PART = (
     "file", "where", "sample", "recording", "experiment", "positive", "columns", "specimen", "noise",
     "attributes", "every", "missing", "settling", "relative_to_first", "lowpass", "separator",
     "decimal", "comment", "skip", "header", "units_row", "format", "direction", "normal",
-    "cycles", "phase", "upto", "preload", "toe",
+    "cycles", "phase", "upto", "preload", "toe", "tissue", "blade",
 )
 # fmt: on
 READING = ("separator", "decimal", "comment", "skip", "header", "units_row", "format")
@@ -98,6 +102,7 @@ class Part:
     direction: tuple[float, float, float] | None = None
     normal: tuple[float, float, float] | None = None
     selection: Selection = Selection()
+    cut: Setup | None = None
     reading: Mapping[str, object] = field(default_factory=dict)
 
 
@@ -177,11 +182,18 @@ def _part(table: Mapping[str, object]) -> Part:
         if not {"file", "key"} <= specimen.keys():
             raise InputError('specimen: expected both file = "sizes.csv" and key = "the column that names the test"')
         lookup = Lookup(specimen.pop("file"), specimen.pop("key"))
-    lowpass = table.get("lowpass")
+    lowpass, cut = table.get("lowpass"), None
+    if experiment == "cutting":
+        cut = setup_from(get("tissue", dict, {}), get("blade", dict, {}))
+    elif "tissue" in table or "blade" in table:
+        raise InputError(f"[tissue] and [blade] are of a cutting test, and this is {experiment}: leave them out")
+    columns = _columns(_in_our_words(get("columns", dict, {}), COLUMN_WORDS, QUANTITIES, "columns"))
+    if cut is None and (odd := [q for q in columns if q in OF_CUTS]):
+        raise InputError(f"columns: {odd[0]} is a quantity of a cutting test, and this is {experiment}: leave it out")
     return Part(
         file=get("file", str, ""),
         experiment=experiment,
-        columns=_columns(_in_our_words(get("columns", dict, {}), COLUMN_WORDS, QUANTITIES, "columns")),
+        columns=columns,
         sample=get("sample", str, "sample"),
         recording=get("recording", str, "r1"),
         where=get("where", dict, {}),
@@ -200,6 +212,7 @@ def _part(table: Mapping[str, object]) -> Part:
         direction=_direction("direction", table.get("direction")),
         normal=_direction("normal", table.get("normal")),
         selection=selection_from(table),
+        cut=cut,
         reading={k: table[k] for k in READING if k in table},
     )
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from jaxtyping import Bool, Float
 from tissuejax.errors import InputError
 from tissuejax.recordings import checks, rig
 from tissuejax.recordings import conversions as convert
+from tissuejax.recordings.cutting_table import cut_from
 from tissuejax.recordings.delimited import Columns
 from tissuejax.recordings.recording import Channel, Recording
 from tissuejax.recordings.selection import chosen, start_of
@@ -22,7 +24,7 @@ Sizes = Mapping[str, float]
 
 
 def recording_from(
-    part: Part, columns: Columns, rows: np.ndarray, sizes: Sizes, name: str, place: str
+    part: Part, columns: Columns, rows: np.ndarray, sizes: Sizes, name: str, place: str, side: Path = Path()
 ) -> tuple[Recording, list[str]]:
     """The recording in `rows` of a table, and what to note about how it came to be.
 
@@ -33,6 +35,7 @@ def recording_from(
         sizes: specimen sizes, SI.
         name: the recording's name.
         place: file, sample and recording, for messages.
+        side: the side file, beside which further files are.
 
     Raises:
         InputError: missing or bad cells (with line and column), times that don't increase, stretch <= 0, a missing
@@ -67,7 +70,12 @@ def recording_from(
         attributes["direction"] = np.array(part.direction)
     if part.normal is not None:
         attributes["normal"] = np.array(part.normal)
-    if part.experiment in ("probing", "cutting"):
+    if part.cut is not None:
+        noise = part.noise.get("force", "estimate")
+        if isinstance(noise, Column):
+            noise = f"{_said(noise, 'force', columns, rows)} N"
+        return cut_from(part.cut, time, values, noise, side, name, place), notes
+    if part.experiment == "probing":
         return _probing(part, time, values, kinematic, load, sizes, name, place, attributes), notes
     motion = _motion(part, values[kinematic], kinematic, sizes, place)
     if load == "force":
@@ -331,8 +339,8 @@ def _probing(
 
     The tip's centre starts at height + radius (height 0 where unknown): touching at zero displacement.
     """
-    if part.experiment != "probing" or (kinematic, load) != ("displacement", "force"):
-        expected = "displacement and force in a probing test; cutting comes in recording files only"
+    if (kinematic, load) != ("displacement", "force"):
+        expected = "displacement and force in a probing test"
         raise checks.refusal(place, f"columns for {part.experiment}", f"{kinematic} and {load}", expected)
     radius = _need(sizes, "radius", "displacement into the tip's position", place)
     position = np.zeros((len(time), 3))

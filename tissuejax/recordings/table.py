@@ -3,7 +3,7 @@
     file       = "tests.csv"             # beside this side file; "shared:recordings/x.csv" for the shared folder
     sample     = "{animal}"              # a name, or {column}: one sample for each value
     recording  = "{test_id}"             # a name, or {column}: one recording for each value
-    experiment = "uniaxial"              # uniaxial, planar, equibiaxial, biaxial, simple-shear, probing
+    experiment = "uniaxial"              # uniaxial, planar, equibiaxial, biaxial, simple-shear, probing, cutting
     positive   = "compression"           # which loads and shortenings the table counts positive ("tension" if absent)
     [columns]
     time         = { column = "time_s", unit = "s", zero = true }
@@ -25,7 +25,8 @@ unit or a column; `file` and `key` look them up in a second table. `[where]` kee
 `mode = ["UT", "PS"]`, `time_s = ">= 2"`. Also: `every = 4` (each fourth sample), `missing = "drop"` (rows with empty
 cells), `relative_to_first = true` (stretch from the first sample's length), `lowpass = "5 Hz"`, `[attributes]` (numbers
 that go with a recording), `separator`, `decimal`, `comment`, `skip`, `header`, `source`, `notes`, `density`. Several
-kinds of tests in one side file: a `[[part]]` for each, with the keys that differ.
+kinds of tests in one side file: a `[[part]]` for each, with the keys that differ. A cut says what else it needs in
+`[tissue]` and `[blade]`, see `cutting_table`.
 """
 
 import functools
@@ -39,6 +40,7 @@ import numpy as np
 
 from tissuejax.errors import InputError, unknown
 from tissuejax.recordings import checks
+from tissuejax.recordings.cutting_table import body
 from tissuejax.recordings.delimited import Columns, load
 from tissuejax.recordings.exports.export import export_named
 from tissuejax.recordings.format import Format
@@ -210,10 +212,14 @@ def _sample(side: SideFile, name: str, groups: Mapping[str, Group]) -> Sample:
     for key, group in groups.items():
         place = f"{group.columns.path}: sample {name!r}, recording {key!r}"
         sizes = {k: _size(side, group, k, v, place) for k, v in group.part.specimen.items()}
-        recordings[key], said = recording_from(group.part, group.columns, group.rows, sizes, key, place)
+        recordings[key], said = recording_from(group.part, group.columns, group.rows, sizes, key, place, side.path)
         notes += [n for n in said if n not in notes]
     checks.distinct((f"{side.path}: {key}", recording) for key, recording in recordings.items())
-    return Sample(name, recordings, None, side.density, None, side.source, " ".join(notes))
+    bodies = {tuple(g.part.cut.tissue.items()): g.part.cut for g in groups.values() if g.part.cut is not None}
+    if len(bodies) > 1:
+        raise InputError(f"{side.path}: sample {name!r} has {len(bodies)} sizes of [tissue]; give each its own sample")
+    geometry = body(next(iter(bodies.values()))) if bodies else None
+    return Sample(name, recordings, geometry, side.density, None, side.source, " ".join(notes))
 
 
 def _size(side: SideFile, group: Group, name: str, size: float | Column, place: str) -> float:

@@ -145,7 +145,9 @@ def proceed(m: Machine, state: State) -> Outcome:
         mean = Felt(*(x / clock.steps for x in total[:3]), total.work, total.spent)
         looked = None
         if scene.faces is not None:
-            looked = look(m, state, None if drive.centre is None else drive.centre[-1] + 0.5 * drive.stride[-1])
+            centre = None if drive.centre is None else drive.centre[-1] + 0.5 * drive.stride[-1]
+            given = centre if state.felt is None else centre + scene.probe.compliance * state.felt
+            looked = look(m, state, given)
         return state, (mean, _markers(scene, state.u), _pace(m, state, drive), looked)
 
     def block(state, drive):

@@ -139,7 +139,10 @@ def advance(m: Machine, state: State, drive: Drive) -> tuple[State, Felt]:
         touch = _touch(scene.probe, m.patch, u, centre, grip)
         outer, grip, rubbed = outer + touch.nodal, touch.grip, touch.rubbed
         force, torque, work = touch.force, touch.torque, -jnp.sum(touch.force * drive.stride)
-        felt = None if felt is None else felt + FEEL * (force - felt)
+        if felt is not None:
+            new = felt + FEEL * (force - felt)
+            work = work - jnp.sum(touch.force * scene.probe.compliance * (new - felt))  # the rig springs back meanwhile
+            felt = new
     if scene.faces is not None:
         held = jax.checkpoint(faces.forces, prevent_cse=False)(scene.faces, m.seam, u, opening)
         outer, opening, lost = outer + held.nodal, held.memory, held.lost
