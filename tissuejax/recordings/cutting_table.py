@@ -138,7 +138,7 @@ def edge(setup: Setup, side: Path) -> Float[np.ndarray, "p 2"]:
         path = side.parent / str(given["picture"])
         if not path.is_file():
             raise InputError(f"{where}: no file {path}")
-        from matplotlib.image import imread
+        from skimage.io import imread
 
         return foremost(imread(path), quantity(given["pixel"], "m", f"{where}.pixel"))
     if set(given) - {"unit"} not in ({"file"}, {"points"}) or "unit" not in given:
