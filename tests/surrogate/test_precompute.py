@@ -43,6 +43,17 @@ def test_the_fine_part_is_the_same_on_both_sides_and_moves_with_the_site():
             assert (np.diff(line) > 0).all()
 
 
+def test_near_the_rim_the_core_is_narrower_on_that_side_alone():
+    """7 mm from the left rim: elements on the right are as large as anywhere."""
+    grid = Grid((16, 16, 4), 4.75e-3)
+    s, _ = lines(made.SLAB, np.array([-0.013, 0.0]), grid)
+    middle, _ = lines(made.SLAB, np.array([0.0, 0.0]), grid)
+    sizes, usual = 0.04 * np.diff(s), 0.04 * np.diff(middle)
+    assert sizes[8:13] == pytest.approx(usual[8:13], abs=1e-12)
+    assert sizes[3:8] == pytest.approx(0.75 * 7e-3 / 5, abs=1e-9)
+    assert sizes[:3].sum() + sizes[3:8].sum() == pytest.approx(7e-3, abs=1e-9)
+
+
 def test_error_at_held_out_places_is_measured_and_small():
     found = made.small()
     error = found.record["error"]
@@ -57,6 +68,24 @@ def test_error_at_held_out_places_is_measured_and_small():
     got = [s.elastic(np.array([*place, contact - d]))[2] for d in made.SMALL_BOX.levels]
     assert np.asarray(got) == pytest.approx(state.force[:, 2], rel=1e-3)
     assert state.force[-1, 2] > 0.02
+
+
+def test_the_vertical_error_and_the_place_of_the_worst_are_told_apart():
+    """A formula's force, and states that differ from it: 2 % upright at one place, 5 % sideways at another."""
+    from tissuejax.surrogate.error import held_out
+
+    s, states = made.formula(), []
+    for place, wrong in (([2e-3, 1e-3], [0, 0, 0.02]), ([-4e-3, 2e-3], [0.05, 0, 0])):
+        depth = np.array([4e-3, 6e-3])
+        force = np.array([np.asarray(s.elastic(made.at(*place, d))) for d in depth])
+        force = force + np.array(wrong) * force[:, 2:]
+        moved = np.zeros((2, s.surface.modes.shape[1], 3))
+        states.append(ramps.Ramp(np.array(place), depth, force, moved, moved[0], *(np.ones(2),) * 3))
+    found = held_out(s, states)
+    assert found["vertical_worst"] == pytest.approx(0.02 / 1.02, rel=1e-2)
+    assert found["force_worst"] == pytest.approx(0.05, rel=1e-2)
+    assert found["worst_at_m"][:2] == [-4e-3, 2e-3]
+    assert found["lateral_worst_N"] == pytest.approx(0.05 * max(states[1].force[:, 2]), rel=1e-3)
 
 
 def test_a_held_press_relaxes_to_the_long_term_share():

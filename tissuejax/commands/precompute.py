@@ -104,11 +104,7 @@ def described(record: dict) -> list[str]:
         f"{wide[0]:.1f} x {wide[1]:.1f} mm, to {1e3 * box['depth_m']:.1f} mm deep, "
         f"{box['sites'][0]} x {box['sites'][1]} sites, {box['depths']} depths",
         f"error of the tables, {wrong['felt']} held-out states over 0.05 N: force "
-        + (
-            f"median {100 * wrong['force_median']:.2f} %, worst {100 * wrong['force_worst']:.2f} %"
-            if wrong["felt"]
-            else "not measured, a larger --depth would"
-        )
+        + (_wrong(wrong) if wrong["felt"] else "not measured, a larger --depth would")
         + f"; shape rms {1e3 * wrong['surface_rms_m']:.3f} mm, worst {1e3 * wrong['surface_worst_m']:.2f} mm",
     ]
     if own and own["force_worst"] is not None:
@@ -120,6 +116,15 @@ def described(record: dict) -> list[str]:
     else:
         lines.append("error of the full model's mesh: not measured")
     return lines
+
+
+def _wrong(wrong: dict) -> str:
+    said = f"median {100 * wrong['force_median']:.2f} %, worst {100 * wrong['force_worst']:.2f} %"
+    if wrong.get("worst_at_m"):
+        x, y, depth = (1e3 * v for v in wrong["worst_at_m"])
+        said += f" at ({x:.1f}, {y:.1f}) mm, {depth:.1f} mm deep (vertical force alone: median "
+        said += f"{100 * wrong['vertical_median']:.2f} %, worst {100 * wrong['vertical_worst']:.2f} %)"
+    return said
 
 
 def place_of(text: str) -> np.ndarray:

@@ -24,11 +24,11 @@ def _shapes(made: Surrogate, p):
     return jax.vmap(made.shape)(p)
 
 
-def held_out(made: Surrogate, ramps: Sequence[Ramp]) -> dict[str, float]:
-    """Errors at states that took no part: force (share of the full force, where it is over `FELT`), lateral force, N,
-    and displacement of all nodes, m."""
+def held_out(made: Surrogate, ramps: Sequence[Ramp]) -> dict[str, object]:
+    """Errors at states that took no part: force (share of the full force, where it is over `FELT`), its vertical part
+    alone, where the force is worst, lateral force, N, and displacement of all nodes, m."""
     force_at, shape_at = eqx.filter_jit(_forces), eqx.filter_jit(_shapes)
-    share, lateral, apart = [], [], []
+    share, upright, at, lateral, apart = [], [], [], [], []
     for r in ramps:
         xy = np.tile(r.place, (len(r.depth), 1))
         z = np.asarray(made.touch(jnp.asarray(r.place)))[0] - r.depth
@@ -37,16 +37,22 @@ def held_out(made: Surrogate, ramps: Sequence[Ramp]) -> dict[str, float]:
         size = np.linalg.norm(r.force, axis=1)
         felt = size > FELT
         share += list(np.linalg.norm(force - r.force, axis=1)[felt] / size[felt])
+        upright += list(np.abs(force - r.force)[felt, 2] / size[felt])
+        at += [(*map(float, r.place), float(d)) for d in r.depth[felt]]
         lateral += list(np.linalg.norm((force - r.force)[:, :2], axis=1))
         moved = np.tensordot(np.asarray(shape_at(made, p)), made.surface.modes, 1)
         apart.append(np.linalg.norm(moved - r.displacement, axis=2))
     apart, share = np.array(apart), np.array(share if share else [np.nan])
+    upright = np.array(upright if upright else [np.nan])
     return {
         "states": int(sum(len(r.depth) for r in ramps)),
         "felt": int(np.isfinite(share).sum()),
         "force_median": float(np.median(share)),
         "force_p95": float(np.quantile(share, 0.95)),
         "force_worst": float(share.max()),
+        "worst_at_m": list(at[int(share.argmax())]) if at else None,
+        "vertical_median": float(np.median(upright)),
+        "vertical_worst": float(upright.max()),
         "lateral_rms_N": float(np.sqrt(np.mean(np.square(lateral)))),
         "lateral_worst_N": float(np.max(lateral)),
         "surface_worst_m": float(apart.max()),

@@ -19,7 +19,7 @@ from tissuejax.surrogate.memory import narrow
 from tissuejax.surrogate.places import Box, checked, first_contact
 from tissuejax.surrogate.ramp import Matter, Ramp, ramp
 from tissuejax.surrogate.refusals import refuse
-from tissuejax.surrogate.site_mesh import Grid, geometry
+from tissuejax.surrogate.site_mesh import GRADING, Grid, geometry
 from tissuejax.surrogate.surrogate import Surrogate
 from tissuejax.surrogate.tabulate import full_scene, summary, surrogate
 
@@ -152,7 +152,7 @@ def fingerprint(matter: Matter, grid: Grid) -> str:
     """Hash of everything that the states of a site follow from, except the site."""
     fine = np.linspace(0, 1, 17)
     shape = b"".join(np.ascontiguousarray(np.round(f(fine, fine), 9)).tobytes() for f in matter.lobe)
-    text = json.dumps(plain([described(matter), matter.radius, grid, repr(matter.settings)]), sort_keys=True)
+    text = json.dumps(plain([described(matter), matter.radius, grid, GRADING, repr(matter.settings)]), sort_keys=True)
     return hashlib.sha256(text.encode() + shape).hexdigest()
 
 
