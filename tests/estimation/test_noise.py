@@ -106,6 +106,15 @@ def test_every_operation_against_the_covariance_matrix(order, rng):
     np.testing.assert_allclose(draws.T @ draws / 1500, c, atol=0.2)
 
 
+@pytest.mark.parametrize("order", [1, 2])
+def test_nothing_to_multiply_or_whiten_is_nothing(order):
+    """No columns (a fit at whose end nothing is free): LAPACK without a right-hand side spoils memory, and the process
+    came to an abort some calls later."""
+    time, noise = np.linspace(0, 7, 70), Noise(0.4, 1.1, 0.8, order)
+    assert noise.times(np.zeros((70, 0)), time).shape == (70, 0)
+    assert noise.whiten(np.zeros((70, 0)), time).shape == (70, 0)
+
+
 def test_other_orders_are_refused():
     with pytest.raises(InputError, match="order 3"):
         Noise(0.4, 1.1, 0.8, 3)

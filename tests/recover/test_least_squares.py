@@ -143,6 +143,36 @@ def test_standard_errors_are_the_scatter_of_the_estimates(case):
     assert 0.88 <= inside <= 1.0
 
 
+def filtered_sample(rng, order, corner, n=200):
+    """The curve in two recordings with noise behind a digital Butterworth filter, its corner over half the rate."""
+    low = scipy.signal.butter(order, corner, output="sos")
+    size = np.sqrt(np.sum(scipy.signal.sosfilt(low, np.eye(1, 4000)[0]) ** 2))
+    sample = toy_sample(rng, TRUE, n=n, noise=0.0)
+    for r in sample.recordings.values():
+        c = r.channels["nominal_stress"]
+        e = scipy.signal.sosfilt(low, rng.normal(size=n + 1000))[-n:] / size
+        r.channels["nominal_stress"] = Channel(c.time, c.values + e, "Pa", 1.0)
+    return sample
+
+
+@pytest.mark.parametrize(("order", "corner"), [(1, 0.1), (2, 0.05), (2, 0.2), (4, 0.1)])
+def test_intervals_hold_behind_a_rig_s_low_pass(order, corner):
+    """Too narrow nowhere; at most 1.7 times too wide where the filter has neither of the two shapes."""
+    scatter, std, inside = drawn(lambda rng: filtered_sample(rng, order, corner), TWO, 60)
+    assert np.all(std > 0.8 * scatter)
+    assert np.all(std < (1.7 if (order, corner) in ((2, 0.2), (4, 0.1)) else 1.3) * scatter)
+    assert inside > 0.9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("order", "corner"), [(1, 0.1), (2, 0.05), (2, 0.2), (4, 0.1)])
+def test_intervals_behind_a_low_pass_cover_93_percent_or_more_over_400_draws(order, corner):
+    _, _, inside = drawn(lambda rng: filtered_sample(rng, order, corner), TWO, 400)
+    assert inside >= 0.93
+    if (order, corner) in ((1, 0.1), (2, 0.05)):
+        assert inside <= 0.97
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_intervals_cover_95_percent_over_400_draws(case):

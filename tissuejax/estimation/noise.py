@@ -114,7 +114,7 @@ class Noise:
         x = np.asarray(x, float)
         if len(x) != len(time):
             raise InputError(f"{len(x)} samples at {len(time)} times; one time a sample is needed")
-        if self.is_white(time):
+        if self.is_white(time) or not x.size:
             return x / self.std
         columns = x.reshape(len(x), -1)
         if self.order == 2:
@@ -191,6 +191,8 @@ class Noise:
 
 def _faded(fade: Float[np.ndarray, " m"], x: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
     """m[i] = fade[i-1] (m[i-1] + x[i-1]), m[0] = 0."""
+    if not x.size:  # without a right-hand side LAPACK's wrapper writes where it may not, and the process ends later
+        return np.zeros_like(x)
     band = np.ones((2, len(x)))
     band[1, :-1] = -fade
     right = np.zeros_like(x)

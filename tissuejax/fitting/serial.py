@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from tissuejax.estimation.correlation import LEAST, Series, estimate
+from tissuejax.estimation.correlation import LEAST, Estimate, Series, estimate
 from tissuejax.estimation.noise import Noise
 from tissuejax.fitting.problem import Problem
 
@@ -53,13 +53,20 @@ def serial(problem: Problem, residuals: Float[np.ndarray, " n"]) -> Serial:
         if not any(_noticed(residuals[rows]) for rows, _ in columns):
             continue
         series = [Series(time, residuals[rows][:, None]) for rows, time in columns]
-        found = estimate(series, recorded=False)
+        found = _shape(series)
         parts += [
             (rows, time, noise)
             for (rows, time), noise in zip(columns, found.noises, strict=True)
             if not noise.is_white(time)
         ]
     return Serial(tuple(parts))
+
+
+def _shape(series: list[Series]) -> Estimate:
+    """Noise behind a low-pass of first or second order. The second falls as a mismatch does, so where it is likelier
+    all that is left is taken for noise, which can only widen intervals; the first is told from a mismatch."""
+    smooth = estimate(series, recorded=False, orders=(1, 2), mismatch=False)
+    return smooth if any(noise.order == 2 for noise in smooth.noises) else estimate(series, recorded=False)
 
 
 def _columns(problem: Problem, key: tuple[str, str]) -> list[tuple[np.ndarray, np.ndarray]]:
