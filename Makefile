@@ -29,8 +29,10 @@ types: $(STAMP)
 QUICK ?= --xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=2
 
 test: lint types docs
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 XLA_FLAGS="$(QUICK)" \
-	    $(BIN)/python -m pytest -n 2 --dist loadfile -q --durations=15
+	mkdir -p out
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 XLA_FLAGS="$(QUICK)" COVERAGE_FILE=out/.coverage \
+	    $(BIN)/python -m pytest -n 2 --dist loadfile -q --durations=15 --cov=tissuejax --cov-report=
+	COVERAGE_FILE=out/.coverage $(BIN)/coverage report --sort=cover | awk 'NR < 18 || /^TOTAL/'
 
 slow: $(STAMP)
 	$(BIN)/python -m pytest -q -m slow
