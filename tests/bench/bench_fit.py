@@ -44,7 +44,7 @@ def ours(posed) -> dict:
     descend(posed)
     first = time.perf_counter() - begun
     seconds, end = timed(lambda: descend(posed))
-    n = end.n_evaluations
+    n = end.runs
     return {
         "sse_MPa2": 2 * end.cost * scale(posed),
         "evaluations": n,

@@ -50,10 +50,10 @@ def test_a_descent_on_a_curved_valley_reaches_its_floor(start):
     bench = Curve()
     bench.free = {p: spot.free["form.c"] for p in ("a", "b", "c")}
     descent = Descent(bench, Plain(), ("a", "b", "c"), ("r",), {})
-    end, cost, _, converged = descent.run(np.array([start, 500.0, 0.0]), 60, 0.1)
-    assert converged
-    assert cost < 0.1
-    assert end[0] == pytest.approx(-17.0, rel=1e-2)
+    end = descent.run(np.array([start, 500.0, 0.0]), 60, 0.1)
+    assert end.converged
+    assert 2 * end.cost < 0.1
+    assert end.y[0] == pytest.approx(-17.0, rel=1e-2)
 
 
 def test_a_value_is_on_its_bound_only_where_it_is():
@@ -88,7 +88,7 @@ def test_an_angle_beside_an_axis_does_not_hold_up_the_rest():
         def whiten(self, jac, recordings):
             return jac
 
-    end, *_ = Descent(Turned(), Plain(), ("a", "t"), ("r",), {}).run(np.array([1500.0, 1e-3]), 30, 1e-3)
+    end = Descent(Turned(), Plain(), ("a", "t"), ("r",), {}).run(np.array([1500.0, 1e-3]), 30, 1e-3).y
     expected = 2000.0 + 0.05 * k * np.sum(x**3) / np.sum(x**2)  # least squares of what is left, at cos(t) = 1
     assert end[0] == pytest.approx(expected, rel=1e-4)
     assert np.cos(end[1]) ** 2 == pytest.approx(1.0, abs=1e-3)

@@ -294,7 +294,7 @@ def test_one_descent_calls_the_model_once_a_step(rng):
     p = problem(toy_sample(rng, TRUE))
     p.predictor.calls = 0
     end = descend(p)
-    assert p.predictor.calls == end.n_evaluations
+    assert p.predictor.calls == end.runs
 
 
 def test_trace_descends(rng):

@@ -1,8 +1,8 @@
 """Full refits: all base parameters, amplitudes and shapes of a set of candidates together, within bounds.
 
-Levenberg-Marquardt whose every step is a small bounded linear least-squares problem, so that one-sided
-amplitudes rest on their bound exactly and leave it when the data want them to. Positive shapes move in logarithm.
-What belongs to one recording alone (an offset, a phase) is fitted on the held-out recordings too, all else fixed.
+Every step is a small bounded linear problem (`estimation.methods.corrected`), so that one-sided amplitudes rest on
+their bound exactly and leave it when the data want them to. Positive shapes move in logarithm. What belongs to one
+recording alone (an offset, a phase) is fitted on the held-out recordings too, all else fixed.
 """
 
 import math
@@ -11,16 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import lsq_linear
 
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.misfit import Misfit
+from tissuejax.estimation.descent import Ended, descend
+from tissuejax.estimation.methods import corrected
+from tissuejax.estimation.posed import LeastSquares
 from tissuejax.estimation.quantile import quantile
-
-HOPELESS = 2e-3  # of what exceeds noise: a fit that leaves much is not polished
-NOTHING = 1e-5  # of the largest effect of a parameter, each moved by its scale: what a one-sided difference errs by
-FREE = 1e-4  # damping below which a step of a true Jacobian that gains nothing is the end
-TURN = 0.8  # rad: the longest step of an angle, a quarter of it after every step that gained nothing
+from tissuejax.estimation.reach import Reach
 
 
 @dataclass(frozen=True)
@@ -81,51 +79,52 @@ class Refit:
         return found
 
 
-@dataclass
-class Descent:
-    """A descent over `paths` on some recordings, the rest of the values held."""
+class Descent(LeastSquares):
+    """The parameters `paths` of a bench as a least-squares problem on some recordings, the rest of the values held.
 
-    bench: Bench
-    misfit: Misfit
-    paths: tuple[str, ...]
-    recordings: tuple[str, ...]
-    rest: dict[str, float]
+    Coordinates are the parameters themselves, positive shapes in logarithm, between their bounds.
+    """
 
-    def __post_init__(self):
-        free = [self.bench.free[p] for p in self.paths]
+    def __init__(
+        self,
+        bench: Bench,
+        misfit: Misfit,
+        paths: tuple[str, ...],
+        recordings: tuple[str, ...],
+        rest: Mapping[str, float],
+    ):
+        self.bench, self.misfit, self.paths, self.recordings, self.rest = bench, misfit, paths, recordings, dict(rest)
+        free = [bench.free[p] for p in paths]
         self.log = np.array([f.log for f in free], bool)
         self.low = np.array([np.log(f.lower) if f.log else f.lower for f in free])
         self.high = np.array([np.log(f.upper) if f.log else f.upper for f in free])
         self.scale = np.array([1.0 if f.log else f.scale for f in free])
-        # near an axis of the tests an angle has next to no slope and wants several turns: the rest must not wait for it
         self.turns = np.array([f.unit == "rad" for f in free], bool)
         self.priors = [(i, *f.prior) for i, f in enumerate(free) if f.prior is not None]
+        self.predictions: dict[bytes, np.ndarray] = {}
 
-    def natural(self, x: np.ndarray) -> dict[str, float]:
+    def natural(self, x: Float[np.ndarray, " p"]) -> dict[str, float]:
         """Values of the free paths at x."""
         return dict(zip(self.paths, np.where(self.log, np.exp(np.where(self.log, x, 0.0)), x).tolist()))
 
-    def point(self, values: Mapping[str, float]) -> np.ndarray:
+    def point(self, values: Mapping[str, float]) -> Float[np.ndarray, " p"]:
         """x inside the box from values."""
         x = [np.log(max(values[p], 1e-300)) if log else values[p] for p, log in zip(self.paths, self.log)]
         return np.clip(np.array(x), self.low, self.high)
 
-    def objective(self, x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-        """Sum of squares with priors, whitened residual, prediction."""
+    def residuals(self, x: Float[np.ndarray, " p"]) -> Float[np.ndarray, " n"]:
+        """Whitened (predicted - measured), with the rows of the priors."""
         prediction = self.bench.predict({**self.rest, **self.natural(x)}, self.recordings)
-        r = self.misfit.residual(prediction, self.recordings)
-        if not np.all(np.isfinite(r)):
-            return np.inf, r, prediction
-        if self.priors:
-            r = np.concatenate([r, [(m - x[i]) / s for i, m, s in self.priors]])
-        return float(r @ r), r, prediction
+        self.predictions[x.tobytes()] = prediction
+        r = -self.misfit.residual(prediction, self.recordings)
+        return np.concatenate([r, [(x[i] - m) / s for i, m, s in self.priors]]) if self.priors else r
 
-    def jacobian(self, x: np.ndarray) -> np.ndarray:
+    def jacobian(self, x: Float[np.ndarray, " p"]) -> Float[np.ndarray, "n p"]:
         """Whitened derivative of the prediction by x, with the rows of the priors."""
         jac = self.bench.jacobian({**self.rest, **self.natural(x)}, self.paths, self.recordings)
         return self.scaled(self.misfit.whiten(jac, self.recordings), x)
 
-    def scaled(self, jac: np.ndarray, x: np.ndarray) -> np.ndarray:
+    def scaled(self, jac: Float[np.ndarray, "m p"], x: Float[np.ndarray, " p"]) -> Float[np.ndarray, "n p"]:
         """A whitened derivative by natural values turned into one by x, with the rows of the priors."""
         values = self.natural(x)
         jac = jac * np.where(self.log, [values[p] for p in self.paths], 1.0)
@@ -136,85 +135,27 @@ class Descent:
             jac = np.concatenate([jac, rows])
         return jac
 
-    def run(
-        self, x: np.ndarray, iterations: int, tolerance: float, jac: np.ndarray | None = None
-    ) -> tuple[np.ndarray, float, np.ndarray, bool]:
-        """From x to (x, cost, prediction, converged).
+    def sharpen(self) -> None:
+        """Derivatives of the very place from now on."""
+        self.bench = self.bench.sharpened()
 
-        A Jacobian costs many predictions, so it is only corrected along steps that keep their promise (Broyden); but a
-        corrected one knows nothing of directions that were not taken, nor that of the start of shapes whose amplitude
-        was zero there: neither may end the descent.
+    def run(
+        self, x: Float[np.ndarray, " p"], iterations: int, tolerance: float, jac: Float[np.ndarray, "n p"] | None = None
+    ) -> Ended:
+        """A `corrected` descent from x.
 
         Args:
+            tolerance: of chi-square.
             jac: the Jacobian at x (as `jacobian` gives it) where it is known already.
         """
-        cost, r, prediction = self.objective(x)
-        tries, sharp = 2 if self.bench.costly else 10, not self.bench.costly
-        # a Jacobian from elsewhere may lack what vanishes there (shapes at zero amplitude): good for one step
-        damping, small, age, given, first = 1e-3, 0, 0, jac is not None, True
-        for _ in range(iterations):
-            if not np.isfinite(cost):
-                return x, cost, prediction, False
-            if jac is None:
-                jac, age = self.jacobian(x), 0
-            if not np.all(np.isfinite(jac)):
-                return x, cost, prediction, False
-            size = np.linalg.norm(jac, axis=0)
-            # A column that is nothing but the error of a difference (a fibre along an axis: no slope in its angle) must
-            # not call for a step of its own, or nothing else moves.
-            nothing = size * self.scale < NOTHING * np.max(size * self.scale, initial=0.0)
-            lacking = given or (first and not np.all(size))
-            first = False
-            q, t = np.linalg.qr(np.where(nothing, 0.0, jac))
-            right, enough = q.T @ r, False
-            size = np.maximum(size, 1e-9 * np.max(size, initial=0.0) + 1e-6 / self.scale)
-            for tried in range(tries):
-                reach = np.where(self.turns, TURN / 4**tried, np.inf)
-                low, high = np.maximum(self.low - x, -reach), np.minimum(self.high - x, reach)
-                a = np.vstack([t, np.diag(np.sqrt(damping) * size)])
-                step = bounded(a, np.concatenate([right, np.zeros(len(x))]), low, high)
-                trial = np.clip(x + step, self.low, self.high)
-                step = trial - x
-                left = r - jac @ step
-                promised = cost - float(left @ left)
-                if self.bench.costly and promised < tolerance and not lacking:  # no simulation is run for so little
-                    new, enough = cost, True
-                    break
-                new, r_new, p_new = self.objective(trial)
-                if new < cost or age > 0:
-                    break
-                damping = max(damping * 8, 1e-6)
-                if np.max(np.abs(step) / np.maximum(self.scale, np.abs(x)), initial=0.0) < 1e-9:
-                    return x, cost, prediction, True
-            else:
-                enough = True
-            if enough:
-                if age > 0:  # a corrected Jacobian knows nothing of directions that were not taken
-                    jac = None
-                    continue
-                if sharp or tried == 0:
-                    return x, cost, prediction, True
-                self.bench, jac, sharp = self.bench.sharpened(), None, True
-                continue
-            if not new < cost:  # a corrected Jacobian failed: take a true one
-                jac = None
-                continue
-            drop = cost - new
-            true = age == 0 and not lacking
-            if drop > 0.7 * promised and age < 3 and step @ step > 0 and not lacking:
-                jac, age = jac + np.outer(left - r_new, step) / (step @ step), age + 1
-            else:
-                jac, given = None, False
-            cost, x, r, prediction = new, trial, r_new, p_new
-            damping = max(damping / 10, 1e-9)
-            tiny = drop < max(tolerance, HOPELESS * (cost - len(r)))
-            if tiny and not true:  # a corrected Jacobian, or one without the column of a shape, tells of no end
-                jac, given = None, False
-                continue
-            small = small + 1 if tiny else 0
-            if small >= 2 or drop < 1e-3 * tolerance or (tiny and damping < FREE):
-                return x, cost, prediction, True
-        return x, cost, prediction, False
+        costly = self.bench.costly
+        reach = Reach(self.low, self.high, self.scale, turns=self.turns)
+        method = corrected(reach, iterations, tolerance, jac, self.sharpen if costly else None, costly)
+        return descend(self, x, method)
+
+    def prediction(self, ended: Ended) -> Float[np.ndarray, " N"]:
+        """The long vector where a descent of this problem ended."""
+        return self.predictions[ended.y.tobytes()]
 
     def errors(self, x: np.ndarray, r: np.ndarray) -> tuple[dict[str, float], tuple[str, ...], float]:
         """Standard errors in natural coordinates (see `inflation`), the paths on a bound, degrees of freedom."""
@@ -250,16 +191,6 @@ def inflation(bench: Bench, chi2: float, n: int, k: int) -> tuple[float, float]:
     return max(scale, 1e-12), float(dof)
 
 
-def bounded(a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """min |a s - b| with low <= s <= high; the free solution where it is allowed."""
-    step = np.linalg.lstsq(a, b, rcond=None)[0]
-    if np.all(step >= low) and np.all(step <= high):
-        return step
-    size = np.linalg.norm(a, axis=0)
-    answer = lsq_linear(a / size, b, (low * size, np.maximum(high, low + 1e-12) * size), method="bvls", max_iter=50)
-    return answer.x / size
-
-
 def refit(
     bench: Bench,
     misfit: Misfit,
@@ -285,19 +216,21 @@ def refit(
     descent = Descent(bench, misfit, paths, bench.fitted, {})
     first = descent.point(whole)
     known = None if seed is None else descent.scaled(seed, first)
-    x, cost, prediction, converged = descent.run(first, iterations, tolerance, known)
+    ended = descent.run(first, iterations, tolerance, known)
+    x, prediction = ended.y, descent.prediction(ended)
     values, own, std, at_bound, dof = descent.natural(x), {}, {}, (), math.inf
     r = misfit.residual(prediction, bench.fitted)
-    chi2 = float(r @ r) if np.isfinite(cost) else np.inf
+    chi2 = float(r @ r) if np.isfinite(ended.cost) else np.inf
     held = np.full(misfit.count(bench.held_out), np.inf)
     if final and np.isfinite(chi2):
         std, at_bound, dof = descent.errors(x, r) if errors else ({}, (), math.inf)
         belong = tuple(p for key in keys for p in bench.candidates[key].held)
         if belong and bench.held_out:
             second = Descent(bench, misfit, belong, bench.held_out, values)
-            y, *_ = second.run(second.point(whole), iterations, tolerance)
-            own = second.natural(y)
+            own = second.natural(second.run(second.point(whole), iterations, tolerance).y)
         prediction = bench.predict({**values, **own})
         held = misfit.residual(prediction, bench.held_out)
     outside = float(held @ held) if np.all(np.isfinite(held)) else np.inf
-    return Refit(tuple(keys), values, own, std, at_bound, chi2, len(r), outside, len(held), converged, prediction, dof)
+    return Refit(
+        tuple(keys), values, own, std, at_bound, chi2, len(r), outside, len(held), ended.converged, prediction, dof
+    )

@@ -76,8 +76,9 @@ def transfer(
 
     def rmse(paths: Sequence[str], rest: Mapping[str, float], start: Mapping[str, float]) -> tuple[float, dict]:
         descent = Descent(bench, misfit, tuple(paths), names, dict(rest))
-        x, _, prediction, _ = descent.run(descent.point({**bench.start, **start}), 60, 1e-3)
-        return float(np.sqrt(np.mean((bench.y - prediction) ** 2))), descent.natural(x)
+        ended = descent.run(descent.point({**bench.start, **start}), 60, 1e-3)
+        left = bench.y - descent.prediction(ended)
+        return float(np.sqrt(np.mean(left**2))), descent.natural(ended.y)
 
     before, alone = rmse(bench.base, {}, {})
     carried, base = rmse((*bench.base, *own), values, alone)

@@ -20,6 +20,7 @@ from jaxtyping import Float
 
 from tissuejax.effects.catalogue import effect
 from tissuejax.errors import InputError, UnstableSimulation
+from tissuejax.estimation.descent import Ended
 from tissuejax.experiments.cutting_blocks import Blocks, blocks
 from tissuejax.experiments.cutting_record import FORCE, Path, drawn
 from tissuejax.experiments.cutting_run import CuttingSettings, element_size
@@ -28,7 +29,6 @@ from tissuejax.fitting.cut_balance import by_balance, linear
 from tissuejax.fitting.cut_resolution import plane_modulus, refuse_joules
 from tissuejax.fitting.cut_result import ENERGY, FRICTION, OPEN, STRENGTH, CutFit, described, misfit_said
 from tissuejax.fitting.least_squares import descend
-from tissuejax.fitting.levenberg_marquardt import Descent
 from tissuejax.fitting.options import Unknowns
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.setup import problem
@@ -162,7 +162,7 @@ def fit_cut(
     return CutFit(values, std, shift, why, chi2, status, runs, by, posed.predictor, predicted, worst, said)
 
 
-def _rounds(made, free, values, max_steps) -> tuple[Problem, Descent, bool, int]:
+def _rounds(made, free, values, max_steps) -> tuple[Problem, Ended, bool, int]:
     """Descents from one start, the slice made anew between them: the last, whether they settled, runs.
 
     Settled is what a slice made for it leaves in place, by a descent that converges or finds less than `FAR` to gain
@@ -173,7 +173,7 @@ def _rounds(made, free, values, max_steps) -> tuple[Problem, Descent, bool, int]
     for n in range(ROUNDS):
         posed = _posed(made, free, values, LATER if n else FIRST)
         ended = descend(posed, values, max_steps=max_steps, tolerance=NEAR if n else FAR)
-        runs += ended.n_evaluations
+        runs += ended.runs
         if not np.isfinite(ended.cost):  # the entry folds: weaker tissue does not
             values = values | {STRENGTH: values[STRENGTH] / 2}
         else:

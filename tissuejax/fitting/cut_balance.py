@@ -54,7 +54,7 @@ def by_balance(
     said = misfit_said(chi2, posed)
     none = dict.fromkeys(free, 0.0)
     p = predictor(with_onset, sample, names)  # all of the records, also where they did not count
-    return CutFit(found, std, none, why, chi2, status, ended.n_evaluations, "balance", p, p.predict(found), 0.0, said)
+    return CutFit(found, std, none, why, chi2, status, ended.runs, "balance", p, p.predict(found), 0.0, said)
 
 
 def calm(sample: Sample, names: tuple[str, ...]) -> Sample:

@@ -12,13 +12,14 @@ import numpy as np
 import optax
 from jaxtyping import Float
 
-from tissuejax.fitting.levenberg_marquardt import Descent
+from tissuejax.estimation.descent import Ended, Heard
+from tissuejax.estimation.ending import Ending
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.transforms import FAR
 
 METHODS = ("adam", "lbfgs")
 RATE = 0.05  # of Adam, in scaled variables, falling to a hundredth by a cosine
-PATIENCE = 20  # steps without the asked decrease before L-BFGS is called converged
+QUIET = 20  # steps without the asked decrease before L-BFGS is called converged
 
 
 def objective(problem: Problem) -> Callable[[Float[jax.Array, " p"]], Float[jax.Array, ""]]:
@@ -73,8 +74,8 @@ def gradient_descent(
     *,
     max_steps: int,
     tolerance: float,
-    on_accept: Callable[[int, float, np.ndarray], None] | None = None,
-) -> Descent:
+    on_accept: Heard | None = None,
+) -> Ended:
     """Minimise by "adam" (ten times `max_steps` steps) or "lbfgs" from the free variables `y`."""
     loss = objective(problem)
     steps = 10 * max_steps if method == "adam" else max_steps
@@ -95,6 +96,10 @@ def gradient_descent(
             updates, state = optimiser.update(slope, state, y, value=value, grad=slope, value_fn=loss)
         return optax.apply_updates(y, updates), state, value
 
+    def ended(why: Ending, n: int) -> Ended:
+        cost, at = best
+        return Ended(at, cost, why, np.zeros(0), np.zeros((0, len(at))), n, 0, trace)
+
     y = jnp.asarray(y)
     state, best, trace, waited = optimiser.init(y), (np.inf, np.asarray(y)), [], 0
     for n in range(1, steps + 1):
@@ -102,11 +107,7 @@ def gradient_descent(
         y, state, value = step(y, state)
         value = float(value)
         if not np.isfinite(value):
-            if n == 1:
-                return Descent(here, np.inf, False, "the model has no finite prediction at the start", 1)
-            return Descent(
-                best[1], best[0], False, "the misfit became infinite; take a bounded or a nearer start", n, trace
-            )
+            return ended(Ending.NO_PREDICTION if n == 1 else Ending.BROKEN, n)
         enough = value < best[0] * (1 - tolerance)
         waited = 0 if enough else waited + 1
         if value < best[0]:
@@ -114,7 +115,7 @@ def gradient_descent(
             trace.append((value, here))
             if on_accept is not None:
                 on_accept(n, value, here)
-        if waited >= PATIENCE and (method == "lbfgs" or n > steps // 2):
-            return Descent(best[1], best[0], True, "converged", n, trace)
-    done = method == "adam"  # Adam's schedule has come to rest
-    return Descent(best[1], best[0], done, "converged" if done else f"no convergence after {steps} steps", steps, trace)
+        if waited >= QUIET and (method == "lbfgs" or n > steps // 2):
+            return ended(Ending.CONVERGED, n)
+    # Adam's schedule has come to rest
+    return ended(Ending.CONVERGED if method == "adam" else Ending.SPENT, steps)

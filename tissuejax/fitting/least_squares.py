@@ -11,14 +11,18 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 
 from tissuejax.errors import InputError, NotConverged
+from tissuejax.estimation.descent import Ended
+from tissuejax.estimation.descent import descend as minimised
+from tissuejax.estimation.methods import exact
+from tissuejax.estimation.posed import LeastSquares, half_square
 from tissuejax.estimation.sigma import sigmas
 from tissuejax.fitting.advice import warnings_of
 from tissuejax.fitting.gradient_descent import METHODS as GRADIENT_METHODS
 from tissuejax.fitting.gradient_descent import gradient_descent
 from tissuejax.fitting.idle import terms, woken
-from tissuejax.fitting.levenberg_marquardt import Descent, levenberg_marquardt
 from tissuejax.fitting.losses import soften
 from tissuejax.fitting.options import Search
 from tissuejax.fitting.problem import Problem
@@ -47,8 +51,8 @@ def descend(
     tolerance: float = 1e-9,
     on_accept: Callable[[int, float, dict[str, float]], None] | None = None,
     to_beat: float = np.inf,
-) -> Descent:
-    """The bare minimisation from one start; `Descent.y` are the free parameters themselves, in the order of
+) -> Ended:
+    """The bare minimisation from one start; `Ended.y` are the free parameters themselves, in the order of
     `problem.free`.
 
     Args:
@@ -74,22 +78,42 @@ def descend(
 
     heard = report if on_accept is not None else None
     if method == "levenberg-marquardt":
-
-        def linearised(y):
-            x, slope = box.bounded(y)
-            r, jacobian = problem.linearised(problem.values(x))
-            r, bend = soften(problem.loss, r)
-            return r, chained(jacobian, slope) * bend[:, None]
-
-        found = levenberg_marquardt(
-            linearised, y, max_steps=max_steps, tolerance=tolerance, on_accept=heard, to_beat=to_beat
-        )
+        found = minimised(InBox(problem), y, exact(len(y), max_steps, tolerance, to_beat), heard)
     elif method in GRADIENT_METHODS:
         found = gradient_descent(problem, y, method, max_steps=max_steps, tolerance=tolerance, on_accept=heard)
     else:
         raise InputError(f"unknown method {method!r}; one of {', '.join(METHODS)}")
     trace = [(cost, box.bounded(y)[0]) for cost, y in found.trace]
-    return Descent(box.bounded(found.y)[0], found.cost, found.converged, found.reason, found.n_evaluations, trace)
+    return replace(found, y=box.bounded(found.y)[0], trace=trace)
+
+
+class InBox(LeastSquares):
+    """A problem in coordinates without bounds (`transforms.Box`), its residuals bent by a loss.
+
+    Residuals and derivatives come from one run in forward mode; those of the last point are kept.
+    """
+
+    def __init__(self, problem: Problem):
+        self.problem, self.at, self.last = problem, b"", (np.zeros(0), np.zeros((0, 0)))
+
+    def linearised(self, y: Float[np.ndarray, " p"]) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n p"]]:
+        """Both; infinite residuals where either is not finite."""
+        if self.at != y.tobytes():
+            x, slope = self.problem.box.bounded(y)
+            r, jacobian = self.problem.linearised(self.problem.values(x))
+            r, bend = soften(self.problem.loss, r)
+            jacobian = chained(jacobian, slope) * bend[:, None]
+            good = np.isfinite(half_square(r)) and np.isfinite(jacobian).all()
+            self.at, self.last = y.tobytes(), (r if good else np.full_like(r, np.inf), jacobian)
+        return self.last
+
+    def residuals(self, y: Float[np.ndarray, " p"]) -> Float[np.ndarray, " n"]:
+        """See `LeastSquares.residuals`."""
+        return self.linearised(y)[0]
+
+    def jacobian(self, y: Float[np.ndarray, " p"]) -> Float[np.ndarray, "n p"]:
+        """See `LeastSquares.jacobian`."""
+        return self.linearised(y)[1]
 
 
 def fit(
@@ -124,12 +148,12 @@ def fit(
     for held in neutral(problem) if start is None and multistart > 1 else ():
         smaller = replace(problem, free=tuple(p for p in problem.free if p not in held))
         inside = descend(smaller, first, method=method, max_steps=max_steps)
-        n += inside.n_evaluations
+        n += inside.runs
         if np.isfinite(inside.cost):
             tries.append(smaller.values(inside.y))
     for values in tries:
         ends.append(descend(problem, values, to_beat=min((e.cost for e in ends), default=np.inf), **options))
-        n += ends[-1].n_evaluations
+        n += ends[-1].runs
     best = min(ends, key=lambda d: (d.cost, not d.converged))
     if not np.isfinite(best.cost):
         raise InputError(
@@ -218,7 +242,7 @@ def _scatter(problem: Problem, r: np.ndarray, jacobian: np.ndarray, memory: Seri
     return (1.0, np.inf) if known else (float(np.sqrt(chi2 / left)), max(1.0, left**2 / squares))
 
 
-def _awake(problem: Problem, best: Descent, options) -> tuple[Descent, int]:
+def _awake(problem: Problem, best: Ended, options) -> tuple[Ended, int]:
     """Go on from `best` with idle terms woken (`fitting.idle`), one at a time as long as that gains."""
     n = 0
     for _ in range(sum(len(series) for series in terms(problem))):
@@ -226,14 +250,14 @@ def _awake(problem: Problem, best: Descent, options) -> tuple[Descent, int]:
         if start is None:
             break
         again = descend(problem, start, **options)
-        n += again.n_evaluations
+        n += again.runs
         if not again.cost < (1 - WORTH) * best.cost:
             break
         best = again
     return best, n
 
 
-def _with_estimated_noise(problem: Problem, best: Descent, options) -> tuple[Problem, Descent, int]:
+def _with_estimated_noise(problem: Problem, best: Ended, options) -> tuple[Problem, Ended, int]:
     """Replace guessed noise by the residuals' own; refit where several levels are unknown, since their ratio
     matters.
     """
@@ -251,18 +275,11 @@ def _with_estimated_noise(problem: Problem, best: Descent, options) -> tuple[Pro
         problem = problem.with_noise(problem.noise.scaled(factors))
         if several or problem.priors or problem.loss != "squares":
             again = descend(problem, problem.values(best.y), **options)
-            n += again.n_evaluations
+            n += again.runs
             best = again if np.isfinite(again.cost) else best
         else:
             factor = next(iter(factors.values())) ** 2
-            best = Descent(
-                best.y,
-                best.cost / factor,
-                best.converged,
-                best.reason,
-                best.n_evaluations,
-                [(cost / factor, x) for cost, x in best.trace],
-            )
+            best = replace(best, cost=best.cost / factor, trace=[(cost / factor, x) for cost, x in best.trace])
     return problem, best, n
 
 

@@ -18,16 +18,18 @@ from jaxtyping import Float
 from tissuejax import storage
 from tissuejax.cache import key
 from tissuejax.errors import InputError
+from tissuejax.estimation.descent import Ended, descend
+from tissuejax.estimation.ending import Ending
+from tissuejax.estimation.methods import sparing
+from tissuejax.estimation.posed import LeastSquares, half_square
 from tissuejax.experiments.probing_predictor import ProbingPredictor, make_ready
 from tissuejax.fitting.advice import warnings_of
 from tissuejax.fitting.bands import fitted_std
 from tissuejax.fitting.closing import Simulated, changes, close
 from tissuejax.fitting.closing import shifts as numerical_shifts
-from tissuejax.fitting.levenberg_marquardt import Descent
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
-from tissuejax.fitting.sparing import sparing
 from tissuejax.fitting.stability import recorded_stability
 from tissuejax.fitting.transforms import chained, unchained
 from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
@@ -107,20 +109,13 @@ def fit_probed(
         y = problem.box.free(problem.vector(start))
         kept.before = kept.before or vector_errors(problem, runs.begin(y))
         if kept.closing:  # the swift descent had ended already
-            J = chained(runs.better(problem.box.bounded(y)[0]), problem.box.bounded(y)[1])
-            descent = Descent(y, 0.5 * float(runs.residuals(y) @ runs.residuals(y)), True, "converged", 0, [])
+            r, (x, slope) = runs.residuals(y), problem.box.bounded(y)
+            J = chained(runs.better(x), slope)
+            descent = Ended(y, half_square(r), Ending.CONVERGED, r, J, 0, 0)
         else:
-            descent, _, J = sparing(
-                runs.jacobian,
-                runs.residuals,
-                y,
-                max_steps=max_steps,
-                fraction=fraction,
-                last=LAST,
-                on_accept=runs.accepted,
-            )
+            descent = descend(runs, y, sparing(len(y), max_steps, fraction, LAST), runs.accepted)
         x, slope = problem.box.bounded(descent.y)
-        J = unchained(J, slope)
+        J = unchained(descent.jacobian, slope)
         kept.keep(problem.values(x), closing=True)
         stage.advance(note="numerical error" if numerical else "the fine simulation")
         seen = changes(problem, problem.values(x), runs.simulated, finish, numerical)
@@ -174,7 +169,7 @@ def fit_probed(
     return ProbedFit(found, shifts, sizes, noise_std, {"forward": runs.simulated.runs, "jacobian": runs.jacobians})
 
 
-class Runs:
+class Runs(LeastSquares):
     """The simulations of a fit: what the descent asks for, in its own coordinates y, told and counted.
 
     Attributes:

@@ -8,13 +8,16 @@ Pereyra 1973; Kaufman 1975, BIT 15. Linearity is not assumed but checked at ever
 `NotSeparable` hands over to the full search.
 """
 
-from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 from scipy.optimize import lsq_linear
 
-from tissuejax.fitting.levenberg_marquardt import HUGE, Descent, levenberg_marquardt
+from tissuejax.estimation.descent import Ended, Heard, descend
+from tissuejax.estimation.ending import Ending
+from tissuejax.estimation.methods import exact
+from tissuejax.estimation.posed import LeastSquares, half_square
 from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.transforms import Box, chained
 
@@ -36,7 +39,7 @@ def separable(problem: Problem) -> bool:
     )
 
 
-class Projection:
+class Projection(LeastSquares):
     """Residual and Jacobian in the remaining parameters, the moduli solved for at each trial."""
 
     def __init__(self, problem: Problem, x: Float[np.ndarray, " p"]):
@@ -50,29 +53,32 @@ class Projection:
         self.low = np.array([problem.bound(path)[0] for path in problem.moduli])
         self.high = np.array([problem.bound(path)[1] for path in problem.moduli])
         self.points: dict[bytes, np.ndarray] = {}
+        self.full, self.slope = np.zeros((0, len(x))), np.ones(0)  # at the best point: the whole Jacobian, and dx/dy
 
-    def __call__(self, y: Float[np.ndarray, " q"]) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n q"]]:
-        """Projected residual and Kaufman's Jacobian at y; no Jacobian (zeros) where the trial is worse than the
-        best.
-        """
+    def residuals(self, y: Float[np.ndarray, " q"]) -> Float[np.ndarray, " n"]:
+        """Projected residual at y; as the straight line foretells it where the trial is worse than the best."""
         x, slope = self.x.copy(), np.ones(0)
         if len(y):
             x[~self.linear], slope = self.box.bounded(y)
         r, jacobian = self._linearised(x)
         if not _finite(r, jacobian):
-            return np.full_like(r, np.inf), np.zeros((len(r), len(y)))
+            return np.full_like(r, np.inf)
         moduli, forecast, _ = self.solve(r, jacobian[:, self.linear], x[self.linear])
         x[self.linear] = moduli
         self.points[y.tobytes()] = x
         if forecast @ forecast > self.best:
-            return forecast, np.zeros((len(r), len(y)))
+            return forecast
         r, jacobian = self._linearised(x)
         if not _finite(r, jacobian):
-            return np.full_like(r, np.inf), np.zeros((len(r), len(y)))
+            return np.full_like(r, np.inf)
         if np.linalg.norm(r - forecast) > LINEAR * (np.linalg.norm(forecast) + 1e-3 * np.sqrt(len(r))):
             raise NotSeparable
-        self.x, self.best = x, float(r @ r)
-        return r, chained(self._projected(jacobian, x), slope)
+        self.x, self.best, self.full, self.slope = x, float(r @ r), jacobian, slope
+        return r
+
+    def jacobian(self, y: Float[np.ndarray, " q"]) -> Float[np.ndarray, "n q"]:
+        """Kaufman's, at the best point so far, which is where a descent asks for it."""
+        return chained(self._projected(self.full, self.points[y.tobytes()]), self.slope)
 
     def solve(self, r, columns, now) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Moduli within bounds, the residual they give, and which are free of their bounds."""
@@ -109,10 +115,10 @@ def projected_descent(
     *,
     max_steps: int,
     tolerance: float,
-    on_accept: Callable[[int, float, np.ndarray], None] | None,
+    on_accept: Heard | None,
     to_beat: float,
-) -> Descent:
-    """Minimise from the free parameters `x` (not transformed); `Descent.y` are free parameters too.
+) -> Ended:
+    """Minimise from the free parameters `x` (not transformed); `Ended.y` are free parameters too.
 
     Raises:
         NotSeparable: the prediction is not linear in the moduli.
@@ -120,30 +126,23 @@ def projected_descent(
     projection = Projection(problem, x)
     y = projection.box.free(x[~projection.linear]) if not projection.linear.all() else np.zeros(0)
     if not len(y):
-        r, _ = projection(y)
-        good = bool(np.isfinite(r).all())
-        cost, end = (0.5 * float(r @ r), projection.x) if good else (np.inf, x)
+        r = projection.residuals(y)
+        cost, good = half_square(r), bool(np.isfinite(r).all())
+        end, why = (projection.x, Ending.CONVERGED) if good else (x, Ending.NO_PREDICTION)
         if good and on_accept is not None:
             on_accept(projection.n, cost, end)
-        reason = "converged" if good else "the model has no finite prediction at the start"
-        return Descent(end, cost, good, reason, projection.n, [(cost, end)] if good else [])
+        return Ended(end, cost, why, r, np.zeros((len(r), 0)), projection.n, 0, [(cost, end)] if good else [])
 
     def heard(_, cost, y):
         on_accept(projection.n, cost, projection.points[y.tobytes()])
 
-    found = levenberg_marquardt(
-        projection,
-        y,
-        max_steps=max(1, max_steps // 2),
-        tolerance=tolerance,
-        on_accept=heard if on_accept is not None else None,
-        to_beat=to_beat,
-    )
+    method = exact(len(y), max(1, max_steps // 2), tolerance, to_beat)
+    found = descend(projection, y, method, heard if on_accept is not None else None)
     if not found.trace:
-        return Descent(x, found.cost, False, found.reason, projection.n)
+        return replace(found, y=x, runs=projection.n)
     trace = [(cost, projection.points[y.tobytes()]) for cost, y in found.trace]
-    return Descent(projection.x, found.cost, found.converged, found.reason, projection.n, trace)
+    return replace(found, y=projection.x, runs=projection.n, trace=trace)
 
 
 def _finite(r: np.ndarray, jacobian: np.ndarray) -> bool:
-    return bool(np.abs(r).max(initial=0) < HUGE and np.isfinite(jacobian).all())
+    return bool(np.isfinite(half_square(r)) and np.isfinite(jacobian).all())
