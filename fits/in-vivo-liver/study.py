@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 from tissuejax.energies.catalogue import volumetric
 from tissuejax.energies.published import published
 from tissuejax.errors import UnstableSimulation
+from tissuejax.estimation.stability import recorded_stability
 from tissuejax.experiments.predictor import predictor
 from tissuejax.experiments.probing_settings import ProbingSettings
 from tissuejax.fitting.options import Unknowns
 from tissuejax.fitting.setup import problem
-from tissuejax.fitting.stability import recorded_stability
 from tissuejax.fitting.stress_curve import errors, stress_curve
 from tissuejax.mesh.columns import Lobe, columns
 from tissuejax.model import Model

@@ -14,8 +14,9 @@ from tests.probing.bench import BODY, QUICK, VALUES, measured, model, recording,
 from tissuejax.effects.catalogue import suited
 from tissuejax.errors import InputError
 from tissuejax.experiments.predictor import predictor
+from tissuejax.fitting.checkpoint import Checkpoint
 from tissuejax.fitting.options import Objective, Unknowns
-from tissuejax.fitting.probed import Checkpoint, fit_probed
+from tissuejax.fitting.probed import fit_probed
 from tissuejax.fitting.setup import problem
 from tissuejax.fitting.stress_curve import fit_stress_curve
 from tissuejax.recordings.recording import Geometry, Sample

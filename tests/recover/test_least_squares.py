@@ -7,12 +7,12 @@ import scipy.signal
 from toy import ToyPredictor, curve, toy_sample
 
 from tissuejax.errors import InputError, NotConverged
+from tissuejax.estimation.problem import Problem
+from tissuejax.estimation.weights import noise
 from tissuejax.fitting.advice import mean_factor
 from tissuejax.fitting.least_squares import descend, fit, required
 from tissuejax.fitting.options import Search
-from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.profile import profile
-from tissuejax.fitting.weights import noise
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 ONCE = Search(multistart=1)

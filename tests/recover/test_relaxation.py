@@ -6,6 +6,7 @@ import pytest
 import tissuejax as tj
 from tissuejax.effects.catalogue import effect
 from tissuejax.errors import InputError
+from tissuejax.estimation.transforms import Box, Sticks, chained, unchained
 from tissuejax.experiments.predictor import predictor
 from tissuejax.fitting.idle import merged, woken
 from tissuejax.fitting.idle import terms as idle_terms
@@ -13,7 +14,6 @@ from tissuejax.fitting.least_squares import descend
 from tissuejax.fitting.options import Unknowns
 from tissuejax.fitting.setup import problem, split
 from tissuejax.fitting.starts import neutral
-from tissuejax.fitting.transforms import Box, Sticks, chained, unchained
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 ONCE = tj.Search(multistart=1)

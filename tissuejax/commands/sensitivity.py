@@ -14,10 +14,10 @@ from tissuejax.commands.outputs import add_out, folder, made
 from tissuejax.energies.catalogue import name_of
 from tissuejax.energies.published import published
 from tissuejax.errors import InputError
+from tissuejax.estimation.weights import Weights, noise
 from tissuejax.experiments.predictor import predictor
 from tissuejax.fitting.sensitivity import local
 from tissuejax.fitting.sobol import sobol
-from tissuejax.fitting.weights import Noise, noise
 from tissuejax.model import Model
 from tissuejax.parameters import begun, checked
 from tissuejax.recordings.files import read
@@ -132,7 +132,7 @@ def virtual(
         f"{mode}/nominal_stress": share * float(np.abs(np.asarray(r.channels["nominal_stress"].values)).max())
         for mode, r in predicted.items()
     }
-    return made, Noise(std)
+    return made, Weights(std)
 
 
 def _published(given):

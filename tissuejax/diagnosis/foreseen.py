@@ -17,7 +17,8 @@ from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.judgement.carried import carried
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.misfit import Misfit
-from tissuejax.diagnosis.refit import Refit, inflation
+from tissuejax.diagnosis.refit import Refit
+from tissuejax.estimation.covariance import inflation
 
 OPEN = 1.0  # standard error over noise from which a prediction counts as open: half of its misfit is not the model's
 
@@ -107,7 +108,7 @@ def _spread(bench: Bench, misfit: Misfit, r: Refit) -> tuple[tuple[str, ...], Fl
     if not paths:
         return (), np.zeros((0, 0))
     _, s, v = np.linalg.svd(fitted / size, full_matrices=False)
-    return paths, (v.T / s) * np.sqrt(inflation(bench, r.chi2, r.n, r.k)[0]) / size[:, None]
+    return paths, (v.T / s) * np.sqrt(inflation(r.chi2, r.n, r.k, bench.estimated)[0]) / size[:, None]
 
 
 def without(jac: Float[np.ndarray, "n k"], own: Float[np.ndarray, "n m"]) -> Float[np.ndarray, "n k"]:

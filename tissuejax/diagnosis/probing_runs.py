@@ -16,14 +16,13 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.cache.key import described
-from tissuejax.cache.key import key as key_of
 from tissuejax.diagnosis.bench import Segment
 from tissuejax.diagnosis.probing_series import picked
 from tissuejax.effects.effect import Effect
+from tissuejax.estimation.finished import Finished
 from tissuejax.experiments import workers
 from tissuejax.experiments.probing_predictor import ProbingPredictor
 from tissuejax.model import Model
-from tissuejax.storage import replacing
 
 # The first group is in every program. Histories take long to run and stay apart.
 GROUPS = (
@@ -75,9 +74,7 @@ class Runs:
     report: Callable[[int], None] = lambda _: None
     count: int = 0
     cost: float = 0.0
-    _known: dict[tuple, np.ndarray] = field(default_factory=dict)
     _models: dict[tuple, ProbingPredictor] = field(default_factory=dict)
-    _depends: str | None = None  # mesh, path and radius of the probe, sensors, effects, settings: all a run depends on
 
     def __post_init__(self):
         one = self.ready[FINE]
@@ -87,14 +84,16 @@ class Runs:
             for own in [[s for s in self.segments if s.recording == n]]
         }
         ready = {k: (p.model, p.settings, p.setups) for k, p in self.ready.items()}
-        self._depends = described((ready, self.effects, self.segments, self.y, self.finite))
+        # mesh, path and radius of the probe, sensors, effects, settings: all that a run depends on
+        depends = described((ready, self.effects, self.segments, self.y, self.finite))
+        self.finished: Finished[np.ndarray] = Finished(self.folder, depends)
 
     def many(self, asked: Sequence[Asked]) -> list[Float[np.ndarray, " N"]]:
         """Predictions, one long vector each: as measured where a recording wasn't asked for, NaN where a run failed."""
         keys = [[self._key(values, r, kind) for r in recordings] for values, recordings, kind in asked]
-        new = [k for k in dict.fromkeys(k for row in keys for k in row) if k not in self._known]
+        new = self.finished.unknown(k for row in keys for k in row)
         self.cost += sum(self._price(kind) for _, kind, _ in new)
-        missing = [k for k in new if not self._find(k)]
+        missing = self.finished.missing(new)
         if missing:
             processes = self.ready[FINE].settings.processes
             for i in range(0, len(missing), BATCH):
@@ -106,14 +105,14 @@ class Runs:
                 for k, run in zip(broken, workers.run_all(again, processes) if again else (), strict=True):
                     done[k] = run
                 for key, run in zip(part, done, strict=True):
-                    self._keep(key, self._cut(key[0], run))
+                    self.finished.keep(key, self._cut(key[0], run))
                 self.count += len(part)
                 self.report(self.count)
         out = []
         for row in keys:
             predicted = self.y.copy()
             for key in row:
-                predicted[self.rows[key[0]]] = self._known[key]
+                predicted[self.rows[key[0]]] = self.finished[key]
             out.append(predicted)
         return out
 
@@ -162,29 +161,6 @@ class Runs:
                 out[s.rows.start - begin : s.rows.stop - begin] = picked(reported, s, self.finite)
         return np.full_like(out, np.nan) if int(run.failed) >= 0 else out
 
-    def _path(self, key: tuple) -> Path | None:
-        if self.folder is None or self._depends is None:
-            return None
-        name = key_of(self._depends, key)  # None where the code has moved since it was loaded
-        return None if name is None else self.folder / f"{name}.npy"
-
-    def _find(self, key: tuple) -> bool:
-        path = self._path(key)
-        if key not in self._known and path is not None and path.exists():
-            self._known[key] = np.load(path)
-        return key in self._known
-
-    def _keep(self, key: tuple, values: np.ndarray) -> None:
-        self._known[key] = values
-        path = self._path(key)
-        if path is not None:
-            with replacing(path) as temporary, open(temporary, "wb") as file:
-                np.save(file, values)
-
     def forget(self) -> None:
         """The diagnosis is finished: remove what was kept on disk."""
-        if self.folder is not None and self.folder.exists():
-            for path in self.folder.glob("*.npy"):
-                path.unlink(missing_ok=True)
-            if not any(self.folder.iterdir()):
-                self.folder.rmdir()
+        self.finished.forget()

@@ -14,6 +14,7 @@ from jaxtyping import Float
 
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.misfit import Misfit
+from tissuejax.estimation.covariance import inflation, standard_errors
 from tissuejax.estimation.descent import Ended, descend
 from tissuejax.estimation.methods import corrected
 from tissuejax.estimation.posed import LeastSquares
@@ -159,7 +160,7 @@ class Descent(LeastSquares):
 
     def errors(self, x: np.ndarray, r: np.ndarray) -> tuple[dict[str, float], tuple[str, ...], float]:
         """Standard errors in natural coordinates (see `inflation`), the paths on a bound, degrees of freedom."""
-        inflate, dof = inflation(self.bench, float(r @ r), len(r), len(x))
+        inflate, dof = inflation(float(r @ r), len(r), len(x), self.bench.estimated)
         span = np.minimum(np.where(np.isfinite(self.high - self.low), self.high - self.low, 1.0), self.scale)
         at = (x - self.low < 1e-6 * span) | (self.high - x < 1e-6 * span)
         std = np.full(len(x), np.nan)
@@ -167,28 +168,10 @@ class Descent(LeastSquares):
         norms = np.linalg.norm(jac, axis=0)
         use = ~at & (norms > 0) & np.isfinite(norms)
         if use.any():
-            _, s, v = np.linalg.svd(jac[:, use] / norms[use], full_matrices=False)
-            if s[-1] > 1e-8 * s[0]:
-                std[use] = np.sqrt(inflate * np.sum((v.T / s) ** 2, axis=1)) / norms[use]
+            std[use] = np.sqrt(inflate) * standard_errors(jac[:, use])
         values = self.natural(x)
         std = np.where(self.log, std * np.array([values[p] for p in self.paths]), std)
         return dict(zip(self.paths, std.tolist())), tuple(p for p, b in zip(self.paths, at) if b), dof
-
-
-def inflation(bench: Bench, chi2: float, n: int, k: int) -> tuple[float, float]:
-    """What variances of estimates are multiplied by, and the degrees of freedom behind it.
-
-    A recorded noise level is only widened where the misfit says that it is more; a guessed one (`Bench.estimated`)
-    gives way to what the model leaves, in either direction. Intervals then follow Student's distribution.
-
-    Args:
-        chi2: of n whitened residuals that k parameters were fitted to.
-    """
-    dof = max(n - k, 1)
-    scale = chi2 / dof
-    if not bench.estimated and scale <= 1.0:
-        return 1.0, math.inf
-    return max(scale, 1e-12), float(dof)
 
 
 def refit(

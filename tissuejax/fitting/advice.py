@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tissuejax.estimation.stability import sentence
 from tissuejax.fitting.memory import begun_loaded, times
-from tissuejax.fitting.stability import sentence
 from tissuejax.parameters import begun
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
-from tissuejax.fitting.problem import Problem
-from tissuejax.fitting.uncertainty import Uncertainty
+from tissuejax.estimation.covariance import Uncertainty
+from tissuejax.estimation.problem import Problem
 
 Std = dict[str, dict[str, Float[np.ndarray, "n ..."]]]
 

@@ -20,7 +20,9 @@ from jaxtyping import Float
 
 from tissuejax.effects.catalogue import effect
 from tissuejax.errors import InputError, UnstableSimulation
+from tissuejax.estimation.covariance import uncertainty
 from tissuejax.estimation.descent import Ended
+from tissuejax.estimation.problem import Problem
 from tissuejax.experiments.cutting_blocks import Blocks, blocks
 from tissuejax.experiments.cutting_record import FORCE, Path, drawn
 from tissuejax.experiments.cutting_run import CuttingSettings, element_size
@@ -30,9 +32,7 @@ from tissuejax.fitting.cut_resolution import plane_modulus, refuse_joules
 from tissuejax.fitting.cut_result import ENERGY, FRICTION, OPEN, STRENGTH, CutFit, described, misfit_said
 from tissuejax.fitting.least_squares import descend
 from tissuejax.fitting.options import Unknowns
-from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.setup import problem
-from tissuejax.fitting.uncertainty import uncertainty
 from tissuejax.model import Model
 from tissuejax.parameters import checked, under
 from tissuejax.recordings.recording import Channel, Recording, Sample

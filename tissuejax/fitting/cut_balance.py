@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from tissuejax.effects.catalogue import effect
+from tissuejax.estimation.covariance import uncertainty
 from tissuejax.experiments.cutting_layers import layer
 from tissuejax.experiments.cutting_predictor import CuttingPredictor
 from tissuejax.experiments.cutting_record import FORCE, drawn, path_of, steady
@@ -14,7 +15,6 @@ from tissuejax.fitting.cut_result import ENERGY, FRICTION, ONSET, STRENGTH, CutF
 from tissuejax.fitting.least_squares import descend
 from tissuejax.fitting.options import Unknowns
 from tissuejax.fitting.setup import problem
-from tissuejax.fitting.uncertainty import uncertainty
 from tissuejax.model import Model
 from tissuejax.recordings.recording import Channel, Sample
 

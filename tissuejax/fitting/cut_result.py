@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tissuejax.estimation.problem import Problem
 from tissuejax.experiments.cutting_predictor import CuttingPredictor
 from tissuejax.experiments.cutting_record import FORCE
-from tissuejax.fitting.problem import Problem
 from tissuejax.recordings.recording import Recording
 
 STRENGTH, ENERGY, FRICTION = "cohesion.strength", "cohesion.energy", "effects.blade-friction.coefficient"

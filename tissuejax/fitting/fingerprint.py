@@ -4,7 +4,7 @@ import hashlib
 
 import numpy as np
 
-from tissuejax.fitting.problem import Problem
+from tissuejax.estimation.problem import Problem
 
 
 def fingerprint(problem: Problem) -> str:

@@ -14,8 +14,8 @@ from jaxtyping import Float
 
 from tissuejax.estimation.descent import Ended, Heard
 from tissuejax.estimation.ending import Ending
-from tissuejax.fitting.problem import Problem
-from tissuejax.fitting.transforms import FAR
+from tissuejax.estimation.problem import Problem
+from tissuejax.estimation.transforms import FAR
 
 METHODS = ("adam", "lbfgs")
 RATE = 0.05  # of Adam, in scaled variables, falling to a hundredth by a cosine

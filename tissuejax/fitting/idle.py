@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tissuejax.fitting.problem import Problem
+from tissuejax.estimation.problem import Problem
 
 IDLE = 1e-3  # share of the whole below which a term is idle
 ALIKE = 0.05  # difference of two logarithms of times below which the terms are one

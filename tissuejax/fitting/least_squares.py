@@ -14,26 +14,26 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.errors import InputError, NotConverged
+from tissuejax.estimation.covariance import Uncertainty, uncertainty
 from tissuejax.estimation.descent import Ended
 from tissuejax.estimation.descent import descend as minimised
+from tissuejax.estimation.losses import soften
 from tissuejax.estimation.methods import exact
 from tissuejax.estimation.posed import LeastSquares, half_square
+from tissuejax.estimation.problem import Problem
 from tissuejax.estimation.sigma import sigmas
+from tissuejax.estimation.stability import recorded_stability
+from tissuejax.estimation.transforms import chained
 from tissuejax.fitting.advice import warnings_of
 from tissuejax.fitting.gradient_descent import METHODS as GRADIENT_METHODS
 from tissuejax.fitting.gradient_descent import gradient_descent
 from tissuejax.fitting.idle import terms, woken
-from tissuejax.fitting.losses import soften
 from tissuejax.fitting.options import Search
-from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
 from tissuejax.fitting.separable import NotSeparable, projected_descent, separable
 from tissuejax.fitting.serial import Serial, serial
-from tissuejax.fitting.stability import recorded_stability
 from tissuejax.fitting.starts import fitted_moduli, neutral, variations
-from tissuejax.fitting.transforms import chained
-from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
 
 STRESS = "nominal_stress"
 METHODS = ("levenberg-marquardt", *GRADIENT_METHODS)

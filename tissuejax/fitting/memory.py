@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from tissuejax.estimation.weights import Weights
 from tissuejax.experiments.predictor import Predictor
-from tissuejax.fitting.weights import Noise
 from tissuejax.recordings.recording import Recording
 
 LENGTHS = 3.0  # of the longest recording: a slower time is a straight line in it
@@ -58,7 +58,7 @@ def spread(bounds: Mapping[str, tuple[float, float]]) -> dict[str, float]:
     return found
 
 
-def begun_loaded(recordings: Mapping[str, Recording], names: Sequence[str], noise: Noise) -> list[str]:
+def begun_loaded(recordings: Mapping[str, Recording], names: Sequence[str], noise: Weights) -> list[str]:
     """Sentences on recordings whose first samples are under load: what was done before is not in them."""
     said = []
     for name in names:

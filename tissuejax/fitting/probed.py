@@ -6,33 +6,33 @@ the last derivatives. Standard errors hold two parts: noise, and how far the est
 are changed (a linear shift: the change of the prediction through the Jacobian).
 """
 
-import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
-from tissuejax import storage
-from tissuejax.cache import key
 from tissuejax.errors import InputError
+from tissuejax.estimation.covariance import Uncertainty, uncertainty
 from tissuejax.estimation.descent import Ended, descend
 from tissuejax.estimation.ending import Ending
 from tissuejax.estimation.methods import sparing
+from tissuejax.estimation.numerical import changes
+from tissuejax.estimation.numerical import shifts as numerical_shifts
 from tissuejax.estimation.posed import LeastSquares, half_square
+from tissuejax.estimation.problem import Problem
+from tissuejax.estimation.stability import recorded_stability
+from tissuejax.estimation.transforms import chained, unchained
 from tissuejax.experiments.probing_predictor import ProbingPredictor, make_ready
 from tissuejax.fitting.advice import warnings_of
 from tissuejax.fitting.bands import fitted_std
-from tissuejax.fitting.closing import Simulated, changes, close
-from tissuejax.fitting.closing import shifts as numerical_shifts
-from tissuejax.fitting.problem import Problem
+from tissuejax.fitting.checkpoint import Checkpoint
+from tissuejax.fitting.closing import close
 from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
-from tissuejax.fitting.stability import recorded_stability
-from tissuejax.fitting.transforms import chained, unchained
-from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
+from tissuejax.fitting.simulated import Simulated
 from tissuejax.progress import Progress, Silent
 
 METHOD = "sparing"
@@ -118,7 +118,7 @@ def fit_probed(
         J = unchained(descent.jacobian, slope)
         kept.keep(problem.values(x), closing=True)
         stage.advance(note="numerical error" if numerical else "the fine simulation")
-        seen = changes(problem, problem.values(x), runs.simulated, finish, numerical)
+        seen = changes(problem, problem.values(x), runs.simulated.all, finish, numerical)
         shifts, sizes = numerical_shifts(problem, seen.left, J)
         stage.advance(note="finer mesh" if finish else "last steps")
         problem, x, r, left = close(problem, x, J, seen, runs.simulated, finish, holdout, runs.better, runs.closer)
@@ -178,7 +178,7 @@ class Runs(LeastSquares):
         jacobians: how many were computed.
     """
 
-    def __init__(self, problem: Problem, stage, kept: "Checkpoint", on_accept: Callable | None):
+    def __init__(self, problem: Problem, stage, kept: Checkpoint, on_accept: Callable | None):
         self.problem, self.stage, self.kept, self.on_accept = problem, stage, kept, on_accept
         fine = problem.predictor
         self.swift = replace(problem, predictor=fine.with_settings(fine.settings.swift))
@@ -260,40 +260,3 @@ def _numerical_sentence(free, shifts, noise: Uncertainty) -> str:
         total = sum(s[path] ** 2 for s in shifts.values()) ** 0.5
         parts.append(f"{path.split('.')[-1]} {total:.3g} (noise {noise.std[i]:.3g})")
     return f"Standard errors include what mesh, step and penalty leave open: {', '.join(parts)}."
-
-
-class Checkpoint:
-    """The last accepted values of a fit on disk, with a mark of the problem they belong to."""
-
-    def __init__(self, path: Path | None, problem: Problem):
-        self.path, self.problem = (None if path is None else Path(path)), problem
-        self.before: dict[str, dict[str, float]] = {}  # errors at the very start
-        self.closing = False  # the swift descent had ended already
-        p = problem.predictor
-        fixed = {path: float(value) for path, value in problem.start.items() if path not in problem.free}
-        aims = (problem.free, fixed, problem.noise, problem.bounds, problem.priors, problem.loss, problem.stiffness)
-        self.mark = key.key(p.model, p.names, p.settings, p.setups, aims, problem.measured)
-        if self.mark is None:  # a law from elsewhere, or code that has moved since it was loaded
-            self.path = None
-
-    def values(self) -> dict[str, float]:
-        """Where to begin: the kept values if they are of this problem, else its start."""
-        start = {path: float(v) for path, v in self.problem.start.items()}
-        if self.path is None or not self.path.exists():
-            return start
-        kept = json.loads(self.path.read_text())
-        if kept.get("mark") != self.mark:
-            return start
-        self.before, self.closing = kept["before"], kept["closing"]
-        return start | kept["values"]
-
-    def keep(self, values: Mapping[str, float], closing: bool = False) -> None:
-        """Note accepted values, and whether the chord steps of the end have begun."""
-        if self.path is not None:
-            kept = {"mark": self.mark, "values": dict(values), "before": self.before, "closing": closing}
-            storage.write_json(self.path, kept)
-
-    def done(self) -> None:
-        """The fit has ended: nothing to resume."""
-        if self.path is not None:
-            self.path.unlink(missing_ok=True)

@@ -12,11 +12,11 @@ import numpy as np
 from tissuejax.cache import source
 from tissuejax.energies.catalogue import forms_of, name_of
 from tissuejax.energies.stability import Stability
+from tissuejax.estimation.covariance import Uncertainty
+from tissuejax.estimation.problem import Problem
 from tissuejax.fitting.fingerprint import fingerprint
 from tissuejax.fitting.first import First
-from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.scores import Score
-from tissuejax.fitting.uncertainty import Uncertainty
 from tissuejax.model import Model
 from tissuejax.parameters import under
 from tissuejax.recordings.recording import Recording

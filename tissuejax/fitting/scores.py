@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from tissuejax.fitting.uncertainty import autocorrelation
+from tissuejax.estimation.covariance import autocorrelation
 from tissuejax.recordings.recording import Recording
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.errors import InputError
+from tissuejax.estimation.covariance import Uncertainty, uncertainty
+from tissuejax.estimation.weights import Weights
 from tissuejax.experiments.predictor import Predictor
-from tissuejax.fitting.uncertainty import Uncertainty, uncertainty
-from tissuejax.fitting.weights import Noise
 from tissuejax.recordings.recording import Recording
 
 SILENT = 0.01  # below this share of a channel's peak an elasticity is not defined
@@ -83,7 +83,7 @@ class Sensitivity:
         }
 
 
-def local(predictor: Predictor, values: Mapping[str, float], paths: Sequence[str], noise: Noise) -> Sensitivity:
+def local(predictor: Predictor, values: Mapping[str, float], paths: Sequence[str], noise: Weights) -> Sensitivity:
     """Sensitivities of all channels that have a noise level, at `values`.
 
     Args:

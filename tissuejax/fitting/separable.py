@@ -18,8 +18,8 @@ from tissuejax.estimation.descent import Ended, Heard, descend
 from tissuejax.estimation.ending import Ending
 from tissuejax.estimation.methods import exact
 from tissuejax.estimation.posed import LeastSquares, half_square
-from tissuejax.fitting.problem import Problem
-from tissuejax.fitting.transforms import Box, chained
+from tissuejax.estimation.problem import Problem
+from tissuejax.estimation.transforms import Box, chained
 
 LINEAR = 1e-6  # how far, as a share of its norm, the residual may differ from the linear forecast
 CUTOFF = 1e-12  # singular values below this share are not solved for

@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from tissuejax.estimation.correlation import LEAST, Estimate, Series, estimate
 from tissuejax.estimation.noise import Noise
-from tissuejax.fitting.problem import Problem
+from tissuejax.estimation.problem import Problem
 
 NOTICED = 2.5  # standard deviations of a lag-one correlation from which the shape of the noise is sought
 

@@ -3,12 +3,12 @@
 from dataclasses import replace
 
 from tissuejax.errors import InputError, unknown
+from tissuejax.estimation.problem import Problem
+from tissuejax.estimation.transforms import checked_bounds
+from tissuejax.estimation.weights import noise
 from tissuejax.experiments.predictor import Predictor
 from tissuejax.fitting.memory import spread, time_bounds
 from tissuejax.fitting.options import Objective, Unknowns
-from tissuejax.fitting.problem import Problem
-from tissuejax.fitting.transforms import checked_bounds
-from tissuejax.fitting.weights import noise
 from tissuejax.parameters import checked
 from tissuejax.recordings.checks import distinct
 from tissuejax.recordings.recording import Sample

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from tissuejax.fitting.problem import Problem
+from tissuejax.estimation.problem import Problem
 from tissuejax.fitting.separable import separable
 
 LEAST = 1e-3  # share of the data that a modulus accounts for at least, at the start

@@ -14,16 +14,16 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.errors import InputError, UnstableSimulation
+from tissuejax.estimation.covariance import Uncertainty
+from tissuejax.estimation.problem import Problem
+from tissuejax.estimation.stability import recorded_stability
 from tissuejax.experiments.predictor import predictor
 from tissuejax.experiments.probing_predictor import ProbingPredictor
 from tissuejax.fitting.least_squares import descend
 from tissuejax.fitting.options import Unknowns
-from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
 from tissuejax.fitting.setup import problem
-from tissuejax.fitting.stability import recorded_stability
-from tissuejax.fitting.uncertainty import Uncertainty
 from tissuejax.model import Model
 from tissuejax.recordings.recording import Channel, Recording, Sample
 

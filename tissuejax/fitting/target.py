@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from tissuejax.errors import InputError
-from tissuejax.fitting.problem import Problem
-from tissuejax.fitting.transforms import Box
+from tissuejax.estimation.problem import Problem
+from tissuejax.estimation.transforms import Box
 
 
 class Target:

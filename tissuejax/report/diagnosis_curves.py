@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from tissuejax.diagnosis.bench import Segment
 from tissuejax.diagnosis.foreseen import prediction_std
-from tissuejax.diagnosis.refit import inflation
 from tissuejax.diagnosis.result import Diagnosis
+from tissuejax.estimation.covariance import inflation
 from tissuejax.estimation.quantile import quantile
 from tissuejax.report.plot import BASE, HELD, INK, MODEL, Plot, grid, legend_below, scatter
 from tissuejax.report.scales import display, label
@@ -148,7 +148,7 @@ def _half(d: Diagnosis) -> Float[np.ndarray, " N"]:
     """Half-widths: noise, errors of the estimates where a prediction costs nothing, and what any law leaves."""
     a, keys = d.answered, frozenset(d.answered.chosen.keys)
     fit = a.plain[keys]
-    level = inflation(a.fitting, fit.chi2, fit.n, fit.k)[0] if a.bench.estimated else 1.0
+    level = inflation(fit.chi2, fit.n, fit.k, estimated=True)[0] if a.bench.estimated else 1.0
     variance = level * a.bench.sigma**2 + a.rest_size() ** 2
     if a.bench is a.fitting:
         variance = variance + prediction_std(a.bench, a.whitenings[keys], fit) ** 2

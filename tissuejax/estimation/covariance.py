@@ -19,6 +19,71 @@ SHARE = 0.3  # a parameter takes part in a combination from this share of its la
 
 
 @dataclass(frozen=True)
+class Directions:
+    """Combinations of parameters by how well residuals see them: J size = u s vt.
+
+    Attributes:
+        u, s, vt: singular vectors and values.
+        size: what each parameter is measured in; values of s are then of order one over its relative error.
+    """
+
+    u: Float[np.ndarray, "n k"]
+    s: Float[np.ndarray, " k"]
+    vt: Float[np.ndarray, "k p"]
+    size: Float[np.ndarray, " p"]
+
+    @classmethod
+    def of(cls, jacobian: Float[np.ndarray, "n p"], size: Float[np.ndarray, " p"]) -> "Directions":
+        """Of a Jacobian of residuals in units of the noise."""
+        return cls(*np.linalg.svd(jacobian * size, full_matrices=False), size)
+
+    @property
+    def top(self) -> float:
+        """The largest singular value; 1 where nothing is seen at all."""
+        return self.s[0] if len(self.s) and self.s[0] > 0 else 1.0
+
+    @property
+    def inverse(self) -> Float[np.ndarray, " k"]:
+        """1 / s, the smallest no smaller than rounding."""
+        return 1 / np.maximum(self.s, 1e-13 * self.top)
+
+    def relative(self, spread: Float[np.ndarray, "k k"] | None = None) -> Float[np.ndarray, "p p"]:
+        """Covariance in units of `size`; `spread` is that of the residuals along u, unit where they are independent."""
+        if spread is None:
+            return (self.vt.T * self.inverse**2) @ self.vt
+        return (self.vt.T * self.inverse) @ spread @ (self.inverse[:, None] * self.vt)
+
+
+def standard_errors(jacobian: Float[np.ndarray, "n p"], weakest: float = 1e-8) -> Float[np.ndarray, " p"]:
+    """Standard errors under independent noise of unit size; NaN where a combination is not seen.
+
+    Args:
+        weakest: smallest singular value over the largest, columns of unit length, that counts as seen.
+    """
+    norms = np.linalg.norm(jacobian, axis=0)
+    found = Directions.of(jacobian, 1 / norms)
+    if not found.s[-1] > weakest * found.s[0]:
+        return np.full(len(norms), np.nan)
+    return np.sqrt(np.diag(found.relative())) / norms
+
+
+def inflation(chi2: float, n: int, k: int, estimated: bool = False) -> tuple[float, float]:
+    """What variances of estimates are multiplied by, and the degrees of freedom behind it.
+
+    A recorded noise level is only widened where the misfit says that it is more; an `estimated` one gives way to what
+    the model leaves, in either direction. Intervals then follow Student's distribution.
+
+    Args:
+        chi2: of n whitened residuals that k parameters were fitted to.
+    """
+    dof = max(n - k, 1)
+    scale = chi2 / dof
+    if not estimated and scale <= 1.0:
+        return 1.0, math.inf
+    return max(scale, 1e-12), float(dof)
+
+
+@dataclass(frozen=True)
 class Uncertainty:
     """Second-order picture of the misfit around the optimum.
 
@@ -73,13 +138,11 @@ def uncertainty(
         dof: degrees of freedom behind `widening`; infinite where the stated noise is used.
     """
     size = np.maximum(np.abs(x), 1e-3 * scale)
-    u, s, vt = np.linalg.svd(jacobian * size, full_matrices=False)
-    top = s[0] if len(s) and s[0] > 0 else 1.0
+    found = Directions.of(jacobian, size)
+    s, vt, top = found.s, found.vt, found.top
     floor = 1e-13 * top
-    inverse = 1 / np.maximum(s, floor)
-    plain = (vt.T * inverse**2) @ vt
-    spread = np.eye(len(s)) if correlated is None else u.T @ correlated(u)
-    relative = (vt.T * inverse) @ spread @ (inverse[:, None] * vt) * widening**2
+    plain = found.relative()
+    relative = (plain if correlated is None else found.relative(found.u.T @ correlated(found.u))) * widening**2
     covariance = relative * np.outer(size, size)
     std = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(std, std)

@@ -13,11 +13,11 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.errors import InputError, unknown
+from tissuejax.estimation.losses import checked_loss
+from tissuejax.estimation.stability import penalty_rows
+from tissuejax.estimation.transforms import Box, Sticks, checked_bounds
+from tissuejax.estimation.weights import Weights
 from tissuejax.experiments.predictor import Predictor
-from tissuejax.fitting.losses import checked_loss
-from tissuejax.fitting.stability import penalty_rows
-from tissuejax.fitting.transforms import Box, Sticks, checked_bounds
-from tissuejax.fitting.weights import Noise
 from tissuejax.recordings.recording import Recording
 
 
@@ -39,7 +39,7 @@ class Problem:
     predictor: Predictor
     free: tuple[str, ...]
     start: Mapping[str, float]
-    noise: Noise
+    noise: Weights
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     loss: str = "squares"
@@ -196,6 +196,6 @@ class Problem:
         parts.append(np.array([(float(values[p]) - mean) / std for p, (mean, std) in self.priors.items()]))
         return np.concatenate(parts)
 
-    def with_noise(self, noise: Noise) -> "Problem":
+    def with_noise(self, noise: Weights) -> "Problem":
         """The same problem with other standard deviations."""
         return replace(self, noise=noise)

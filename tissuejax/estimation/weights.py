@@ -17,7 +17,7 @@ GUESS = 0.01  # share of the channel's root mean square, until residuals say bet
 
 
 @dataclass(frozen=True)
-class Noise:
+class Weights:
     """Standard deviations by "recording/channel", SI.
 
     Attributes:
@@ -33,15 +33,15 @@ class Noise:
         """Whether any of them has to come from the residuals."""
         return bool(self.groups)
 
-    def scaled(self, factors: Mapping[str, float]) -> "Noise":
+    def scaled(self, factors: Mapping[str, float]) -> "Weights":
         """Estimated groups multiplied by a factor each."""
         std = {key: s * factors.get(self.groups.get(key, ""), 1.0) for key, s in self.std.items()}
-        return Noise(std, self.groups)
+        return Weights(std, self.groups)
 
 
 def noise(
     sample: Sample, names: tuple[str, ...], choice: str | Mapping[str, float] = "auto", channels: tuple[str, ...] = ()
-) -> Noise:
+) -> Weights:
     """The noise of all channels of the named recordings.
 
     Args:
@@ -64,7 +64,7 @@ def noise(
     if not found:
         raise InputError(f"no channel to fit in recordings {', '.join(names)}")
     if not isinstance(choice, str):
-        return Noise({key: _given(key, name, choice) for key, (name, _) in found.items()})
+        return Weights({key: _given(key, name, choice) for key, (name, _) in found.items()})
     if choice not in CHOICES:
         raise unknown("choice of weights", choice, CHOICES)
     std, groups = {}, {}
@@ -78,7 +78,7 @@ def noise(
         members = [key for key, g in groups.items() if g == group]
         size = _size([found[key][1] for key in members])
         std |= {key: GUESS * size for key in members}
-    return Noise(
+    return Weights(
         {key: std[key] for key in found}, groups if choice != "relative" else dict.fromkeys(groups, "relative")
     )
 
