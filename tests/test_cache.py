@@ -14,11 +14,11 @@ import pytest
 from tissuejax.cache import key, programs, source
 from tissuejax.cache.key import described
 from tissuejax.cache.programs import Kept
-from tissuejax.diagnosis.bench import Segment
 from tissuejax.effects.drift import Drift
 from tissuejax.energies.catalogue import energy
 from tissuejax.energies.fibre import WithFibre
 from tissuejax.energies.neo_hookean import NeoHookean
+from tissuejax.estimation.series import Segment
 from tissuejax.model import Model
 
 

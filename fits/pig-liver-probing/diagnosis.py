@@ -15,12 +15,13 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import minimize
 
-from tissuejax.diagnosis.bench import Bench, Candidate, Free, Segment
+from tissuejax.diagnosis.bench import Bench, Candidate, Free
 from tissuejax.diagnosis.judgement import answer as judged
 from tissuejax.diagnosis.judgement.blocks import State, blocks, series, strain
 from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.errors import InputError
 from tissuejax.estimation.discrepancy import discrepancy
+from tissuejax.estimation.series import Segment
 from tissuejax.experiments.layer_indentation import force
 from tissuejax.report.page import png
 from tissuejax.report.plot import FAINT, HELD, INK, MODEL, grid

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from tissuejax.diagnosis.bench import Bench, Free, Segment
+from tissuejax.diagnosis.bench import Bench, Free
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.refit import refit
+from tissuejax.estimation.series import Segment
 
 X = np.linspace(0.0, 1.0, 8)
 TRUTH = {"a": 3.0, "b": 5.0}

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from spring_bench import judged, spring
 
-from tissuejax.diagnosis.bench import Segment
 from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.diagnosis.stiffness_map import StiffnessMap
+from tissuejax.estimation.series import Segment
 from tissuejax.report import diagnosis_sentences as sentences
 from tissuejax.report import judged_sentences
 from tissuejax.report.diagnosis_map import DiagnosisMap, strongest

@@ -9,7 +9,6 @@ import pytest
 from tests.probing.bench import VALUES, measured, recording, sample
 from tissuejax.cache import source
 from tissuejax.diagnosis import probing_free
-from tissuejax.diagnosis.bench import Segment
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_runs import COARSE, FINE, RETIMED
@@ -17,6 +16,7 @@ from tissuejax.diagnosis.probing_series import calmed
 from tissuejax.diagnosis.probing_view import LEFT, REMAINS, ProbingView
 from tissuejax.diagnosis.refit import refit
 from tissuejax.energies.catalogue import energy
+from tissuejax.estimation.series import Segment
 from tissuejax.experiments import workers
 from tissuejax.recordings.recording import Sample
 

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tissuejax.diagnosis.bench import Segment
 from tissuejax.diagnosis.judgement.blocks import blocks
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, amplitudes
 from tissuejax.diagnosis.probing_discrepancy import probing_discrepancy
 from tissuejax.diagnosis.probing_view import BLOCKS
+from tissuejax.estimation.series import Segment
 
 NOISE = {"force": 0.007, "markers": 0.02}  # of the largest value, as in careful recordings
 

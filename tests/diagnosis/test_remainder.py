@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from spring_bench import spring
 
-from tissuejax.diagnosis.bench import Segment
 from tissuejax.diagnosis.remainder import over_places, remainder
+from tissuejax.estimation.series import Segment
 
 TRUTH = {"a": 10.0, "b": 20.0}
 

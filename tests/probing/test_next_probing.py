@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from tests.probing import bench
-from tissuejax.diagnosis.bench import Segment
 from tissuejax.diagnosis.next_probing import DEEPER, presses, probing_proposals, told_apart
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.refit import Refit
 from tissuejax.energies.catalogue import energy
+from tissuejax.estimation.series import Segment
 
 
 @pytest.fixture

@@ -13,34 +13,7 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Float
 
-
-@dataclass(frozen=True)
-class Segment:
-    """One scalar series: a component of a channel of a recording.
-
-    Attributes:
-        recording, channel, component: where it belongs; component is "" for a scalar channel.
-        rows: its place in the long vector.
-        time: s.
-        unit: SI unit of the values.
-        drive: what was done at these times (stretch, shear, or depth in m), to locate by.
-        drive_name, drive_unit: what the drive is called.
-    """
-
-    recording: str
-    channel: str
-    component: str
-    rows: slice
-    time: Float[np.ndarray, " n"]
-    unit: str
-    drive: Float[np.ndarray, " n"]
-    drive_name: str = "stretch"
-    drive_unit: str = "1"
-
-    @property
-    def label(self) -> str:
-        """Channel and component in words."""
-        return f"{self.channel} {self.component}".strip()
+from tissuejax.estimation.series import Segment
 
 
 @dataclass(frozen=True)

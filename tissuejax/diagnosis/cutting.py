@@ -19,13 +19,14 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.cohesion.catalogue import law
-from tissuejax.diagnosis.bench import Bench, Candidate, Free, Segment
+from tissuejax.diagnosis.bench import Bench, Candidate, Free
 from tissuejax.diagnosis.cutting_discrepancy import MAP
 from tissuejax.diagnosis.next_cut import next_cut
 from tissuejax.effects.catalogue import effects, suited
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.volumetric import Quadratic
 from tissuejax.errors import unknown
+from tissuejax.estimation.series import Driven, Series
 from tissuejax.experiments.cutting import balance_force
 from tissuejax.experiments.cutting_layers import ages, layer
 from tissuejax.experiments.cutting_record import FORCE, Path, steady
@@ -61,17 +62,20 @@ class CuttingBench(Bench):
         tried = [suited(n, "cutting", **FORMS.get(n, {})) for n in known if not names or n in names]
         model = Model(energy, Quadratic(), (suited("onset", "cutting"), *tried), cohesion=law("bilinear"))
         p = predictor(model, sample, (*fitted, *held_out)) if like is None else like._p
-        segments, ys, sigmas, at, kept = [], [], [], 0, {}
-        for name in (*fitted, *held_out):
-            seen, path = p.sample.recordings[name].channels[FORCE], p.paths_of[name]
-            kept[name] = np.flatnonzero(steady(path, np.asarray(seen.time, float)))
-            y, time = np.asarray(seen.values, float)[kept[name]], np.asarray(seen.time, float)[kept[name]]
-            rows, at = slice(at, at + len(y)), at + len(y)
-            drive = np.interp(time, path.time, path.x)
-            segments.append(Segment(name, FORCE, "", rows, time, "N", drive, "place", "m"))
-            ys.append(y)
-            sigmas.append(np.full(len(y), seen.noise_std or 0.02 * float(np.abs(y).max())))
-        y = np.concatenate(ys)
+        paths, recordings = p.paths_of, p.sample.recordings
+
+        def cut(name: str, channel: str, _: int) -> Driven:
+            path, time = paths[name], np.asarray(recordings[name].channels[channel].time, float)
+            return np.interp(time, path.time, path.x), "place", "m"
+
+        def moving(name: str, channel: str) -> np.ndarray:
+            return steady(paths[name], np.asarray(recordings[name].channels[channel].time, float))
+
+        measured = Series.of(p.sample, dict.fromkeys((*fitted, *held_out), (FORCE,)), cut, taking=moving, lost=True)
+        segments, y = measured.segments, measured.y
+        kept = {s.recording: place for s, place in zip(segments, measured.places, strict=True)}
+        stated = {n: recordings[n].channels[FORCE].noise_std for n in kept}
+        sigmas = [np.full(len(s.time), stated[s.recording] or 0.02 * float(np.abs(y[s.rows]).max())) for s in segments]
         deep = max(float(path.depth.max()) for path in p.paths_of.values())
         top = float(np.quantile(np.abs(y), 0.95)) / max(deep, 1e-6)
         start = {q: float(d.default) for q, d in model.declared.items()}

@@ -11,8 +11,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import uniform_filter1d
 
-from tissuejax.diagnosis.bench import Bench, Segment
+from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.periodogram import periodogram
+from tissuejax.estimation.series import Segment
 
 CYCLES = 2.0  # fewer periods in a recording are no period: any single press looks like one
 PHASES = ("rest", "loading", "hold", "unloading")

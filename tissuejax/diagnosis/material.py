@@ -20,17 +20,19 @@ from jaxtyping import Array, Float
 
 from tissuejax.cache.key import described
 from tissuejax.cache.programs import Kept
-from tissuejax.diagnosis.bench import Bench, Candidate, Free, Segment
+from tissuejax.diagnosis.bench import Bench, Candidate, Free
 from tissuejax.diagnosis.catalogue import Entry, Sizes, entries
 from tissuejax.diagnosis.judgement.blocks import State, strain
 from tissuejax.diagnosis.periodogram import lines
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.energies.energy import Energy
+from tissuejax.estimation.series import Series
 from tissuejax.experiments.catalogue import experiment
 from tissuejax.experiments.homogeneous import nominal_stress
 from tissuejax.model import Model
 from tissuejax.recordings.recording import Sample
 
+STRESS_CHANNEL = "nominal_stress"
 MEMORIES = ("viscoelasticity", "softening")
 CYCLES = 2.5  # periods that the longest recording must hold to show one
 SHORTEST = 128  # samples that a series is lengthened to
@@ -103,33 +105,19 @@ class MaterialBench(Bench):
         }
         first = min(float(t.start) for t in tests.values())  # the clock's zero means nothing, only what has passed
         tests = {n: replace(t, start=t.start - first) for n, t in tests.items()}
-        segments, ys, sigmas, at = [], [], [], 0
-        for n in recordings:
-            r = sample.recordings[n]
-            values = np.asarray(r.channels["nominal_stress"].values, float)
-            drive = np.asarray(r.inputs["shear" if "shear" in r.inputs else "stretch"], float)
-            two = values.ndim == 2
-            for i in range(values.shape[1] if two else 1):
-                y = values[:, i] if two else values
-                rows = slice(at, at + len(y))
-                at = rows.stop
-                time, seen = np.asarray(r.inputs["time"], float), drive[:, i] if two else drive
-                kind = "shear" if "shear" in r.inputs else "stretch"
-                axis = f"axis {i + 1}" if two else ""
-                segments.append(Segment(n, "nominal_stress", axis, rows, time, "Pa", seen, kind, "1"))
-                ys.append(y)
-                sigmas.append(np.full(len(y), sigma[n]))
+        measured = Series.of(sample, dict.fromkeys(recordings, (STRESS_CHANNEL,)), lost=True)
+        segments = measured.segments
         bench = cls(
             segments=segments,
-            y=np.concatenate(ys),
-            sigma=np.concatenate(sigmas),
+            y=measured.y,
+            sigma=np.concatenate([np.full(len(s.time), sigma[s.recording]) for s in segments]),
             fitted=fitted,
             held_out=held_out,
             base=(),
             free={},
             start={},
             candidates={},
-            estimated=not any(sample.recordings[n].channels["nominal_stress"].noise_std for n in fitted),
+            estimated=not any(sample.recordings[n].channels[STRESS_CHANNEL].noise_std for n in fitted),
         )
         bench._tests = tests
         bench._of = {n: [s for s in segments if s.recording == n] for n in recordings}

@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from tissuejax.diagnosis.bench import Bench, Segment
+from tissuejax.diagnosis.bench import Bench
 from tissuejax.estimation.correlation import Series, estimate
 from tissuejax.estimation.noise import Noise
+from tissuejax.estimation.series import Segment
 
 WHITE = Noise()
 Place = tuple[str, str]  # recording, channel

@@ -16,10 +16,10 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.cache.key import described
-from tissuejax.diagnosis.bench import Segment
 from tissuejax.diagnosis.probing_series import picked
 from tissuejax.effects.effect import Effect
 from tissuejax.estimation.finished import Finished
+from tissuejax.estimation.series import Segment
 from tissuejax.experiments import workers
 from tissuejax.experiments.probing_predictor import ProbingPredictor
 from tissuejax.model import Model

@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
 
-from tissuejax.diagnosis.bench import Segment
+from tissuejax.estimation.series import Driven, Segment, Series
 from tissuejax.experiments.probing_predictor import ProbingPredictor
-from tissuejax.recordings.recording import Sample
+from tissuejax.recordings.recording import Channel, Sample
 
 CHANNELS = ("force", "markers")
 FEWEST = 8  # samples of a series worth having
@@ -19,31 +19,29 @@ FEWEST = 8  # samples of a series worth having
 
 def series(sample: Sample, ready: ProbingPredictor) -> tuple[list[Segment], np.ndarray, np.ndarray]:
     """All force and marker series cut into segments, with measurement and sigma."""
-    segments, ys, sigmas, at = [], [], [], 0
+    recordings = sample.recordings
+    touch, paths = {}, {}
     for name in ready.names:
-        r = sample.recordings[name]
+        r = recordings[name]
         t, z = np.asarray(r.inputs["probe/time"], float), np.asarray(r.inputs["probe/position"], float)[:, 2]
-        touch = float(np.interp(float(ready.setups[name].test.first_touch), t, z))
-        for channel in CHANNELS:
-            if channel not in r.channels:
-                continue
-            ch = r.channels[channel]
-            time = np.asarray(ch.time, float)
-            flat = np.asarray(ch.values, float).reshape(len(time), -1)
-            noise = float(ch.noise_std or 0.01 * np.nanstd(flat))
-            for j in range(flat.shape[1]):
-                good = np.isfinite(flat[:, j])
-                if good.sum() < FEWEST:
-                    continue
-                axis = "xyz"[j % 3]
-                component = axis if channel == "force" else f"marker {j // 3} {axis}"
-                rows = slice(at, at + int(good.sum()))
-                at = rows.stop
-                depth = np.maximum(touch - np.interp(time[good], t, z), 0.0)
-                segments.append(Segment(name, channel, component, rows, time[good], ch.unit, depth, "depth", "m"))
-                ys.append(flat[good, j])
-                sigmas.append(np.full(int(good.sum()), noise))
-    return segments, np.concatenate(ys), np.concatenate(sigmas)
+        paths[name], touch[name] = (t, z), float(np.interp(float(ready.setups[name].test.first_touch), t, z))
+
+    def pressed(name: str, channel: str, _: int) -> Driven:
+        time = np.asarray(recordings[name].channels[channel].time, float)
+        return np.maximum(touch[name] - np.interp(time, *paths[name]), 0.0), "depth", "m"
+
+    def component(channel: str, _: int, j: int) -> str:
+        axis = "xyz"[j % 3]
+        return axis if channel == "force" else f"marker {j // 3} {axis}"
+
+    wanted = {name: [c for c in CHANNELS if c in recordings[name].channels] for name in ready.names}
+    cut = Series.of(sample, wanted, pressed, component, fewest=FEWEST)
+    sigmas = [np.full(len(s.time), _stated(recordings[s.recording].channels[s.channel])) for s in cut.segments]
+    return list(cut.segments), cut.y, np.concatenate(sigmas)
+
+
+def _stated(channel: Channel) -> float:
+    return float(channel.noise_std or 0.01 * np.nanstd(np.asarray(channel.values, float)))
 
 
 def kept_samples(sample: Sample, segments: Sequence[Segment]) -> dict[int, np.ndarray]:

@@ -16,8 +16,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import BSpline
 
-from tissuejax.diagnosis.bench import Bench, Segment
+from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.locate import rest_value
+from tissuejax.estimation.series import Segment
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from jaxtyping import Float
 
 from tissuejax.errors import InputError, unknown
 from tissuejax.estimation.losses import checked_loss
+from tissuejax.estimation.series import Series
 from tissuejax.estimation.stability import penalty_rows
 from tissuejax.estimation.transforms import Box, Sticks, checked_bounds
 from tissuejax.estimation.weights import Weights
@@ -127,29 +128,37 @@ class Problem:
         )
 
     @cached_property
-    def measured(self) -> dict[tuple[str, str], Float[np.ndarray, " n"]]:
-        """Measured values of each channel, flat."""
-        recordings = self.predictor.sample.recordings
-        return {(r, c): np.asarray(recordings[r].channels[c].values, float).ravel() for r, c in self.channels}
+    def series(self) -> Series:
+        """All that was measured as one long vector, the residuals' own order; lost samples are left out."""
+        wanted: dict[str, list[str]] = {}
+        for recording, channel in self.channels:
+            wanted.setdefault(recording, []).append(channel)
+        return Series.of(self.predictor.sample, wanted)
 
     @cached_property
-    def seen(self) -> dict[tuple[str, str], np.ndarray]:
-        """Indices of the samples that were not lost."""
-        return {key: np.flatnonzero(np.isfinite(values)) for key, values in self.measured.items()}
+    def std(self) -> Float[np.ndarray, " n"]:
+        """Standard deviation of every measured value, SI."""
+        return np.concatenate(
+            [np.full(len(s.time), self.sigma((s.recording, s.channel))) for s in self.series.segments]
+        )
 
     @cached_property
     def rows(self) -> dict[tuple[str, str], slice]:
         """Where each channel lies in the residuals."""
-        found, first = {}, 0
-        for key in self.channels:
-            found[key] = slice(first, first + len(self.seen[key]))
-            first = found[key].stop
-        return found
+        return self.series.rows()
+
+    @cached_property
+    def seen(self) -> dict[tuple[str, str], np.ndarray]:
+        """Indices of the samples that were not lost, in the order of the residuals, into each channel's flat array."""
+        found: dict[tuple[str, str], list[np.ndarray]] = {}
+        for s, place in zip(self.series.segments, self.series.places, strict=True):
+            found.setdefault((s.recording, s.channel), []).append(place)
+        return {key: np.concatenate(places) for key, places in found.items()}
 
     @property
     def n_samples(self) -> int:
         """Number of measured values that take part."""
-        return sum(len(kept) for kept in self.seen.values())
+        return len(self.series.y)
 
     def sigma(self, key: tuple[str, str]) -> float:
         """Standard deviation of one channel, SI."""
@@ -175,9 +184,8 @@ class Problem:
         predicted, slopes = self.predictor.jacobian(dict(values), self.free)
         jacobian = np.empty((self.n_samples + len(self.priors), len(self.free)))
         for column, path in enumerate(self.free):
-            for key, rows in self.rows.items():
-                slope = np.asarray(slopes[path][key[0]][key[1]], float).ravel()[self.seen[key]]
-                jacobian[rows, column] = slope / self.sigma(key)
+            slope = self.series.stacked(lambda recording, channel, own=slopes[path]: own[recording][channel])
+            jacobian[: self.n_samples, column] = slope / self.std
             for row, (prior, (_, std)) in enumerate(self.priors.items(), start=self.n_samples):
                 jacobian[row, column] = (prior == path) / std
         r = self.misfit(predicted, values)
@@ -188,13 +196,8 @@ class Problem:
 
     def misfit(self, predicted: Mapping[str, Recording], values: Mapping[str, float]) -> Float[np.ndarray, " n"]:
         """Residuals of a prediction that is there already."""
-        parts = []
-        for (recording, channel), kept in self.seen.items():
-            value = np.asarray(predicted[recording].channels[channel].values, float).ravel()[kept]
-            measured = self.measured[recording, channel][kept]
-            parts.append((value - measured) / self.sigma((recording, channel)))
-        parts.append(np.array([(float(values[p]) - mean) / std for p, (mean, std) in self.priors.items()]))
-        return np.concatenate(parts)
+        left = (self.series.predicted(predicted) - self.series.y) / self.std
+        return np.concatenate([left, [(float(values[p]) - mean) / std for p, (mean, std) in self.priors.items()]])
 
     def with_noise(self, noise: Weights) -> "Problem":
         """The same problem with other standard deviations."""

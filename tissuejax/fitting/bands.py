@@ -41,10 +41,9 @@ def fitted_std(problem: Problem, jacobian: Float[np.ndarray, "n p"], spread: Unc
     found: Std = {}
     for key, rows in problem.rows.items():
         recording, channel = key
-        std = np.full(problem.measured[key].shape, np.nan)
-        std[problem.seen[key]] = carried(jacobian[rows], spread) * problem.sigma(key)
-        shape = np.shape(problem.predictor.sample.recordings[recording].channels[channel].values)
-        found.setdefault(recording, {})[channel] = std.reshape(shape)
+        std = np.full(np.shape(problem.predictor.sample.recordings[recording].channels[channel].values), np.nan)
+        std.flat[problem.seen[key]] = carried(jacobian[rows], spread) * problem.sigma(key)
+        found.setdefault(recording, {})[channel] = std
     return found
 
 

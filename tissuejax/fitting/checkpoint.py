@@ -19,7 +19,7 @@ class Checkpoint:
         p = problem.predictor
         fixed = {path: float(value) for path, value in problem.start.items() if path not in problem.free}
         aims = (problem.free, fixed, problem.noise, problem.bounds, problem.priors, problem.loss, problem.stiffness)
-        self.mark = key.key(p.model, p.names, p.settings, p.setups, aims, problem.measured)
+        self.mark = key.key(p.model, p.names, p.settings, p.setups, aims, problem.series.y)
         if self.mark is None:  # a law from elsewhere, or code that has moved since it was loaded
             self.path = None
 

@@ -27,7 +27,7 @@ def objective(problem: Problem) -> Callable[[Float[jax.Array, " p"]], Float[jax.
     box = problem.box
     keys = list(problem.seen)
     kept = [jnp.asarray(problem.seen[k]) for k in keys]
-    measured = [jnp.asarray(problem.measured[k][problem.seen[k]]) for k in keys]
+    measured = [jnp.asarray(problem.series.y[problem.rows[k]]) for k in keys]
     fixed = {path: jnp.asarray(float(v)) for path, v in problem.start.items()}
 
     def bounded(y):

@@ -48,8 +48,8 @@ def serial(problem: Problem, residuals: Float[np.ndarray, " n"]) -> Serial:
     """The correlation of the noise in `residuals`, by channel; none where neighbours are as good as independent."""
     parts = []
     for channel in dict.fromkeys(c for _, c in problem.channels):
-        columns = [x for key in problem.channels if key[1] == channel for x in _columns(problem, key)]
-        columns = [(rows, time) for rows, time in columns if len(rows) >= LEAST]
+        own = [s for s in problem.series.segments if s.channel == channel and len(s.time) >= LEAST]
+        columns = [(np.arange(s.rows.start, s.rows.stop), s.time) for s in own]
         if not any(_noticed(residuals[rows]) for rows, _ in columns):
             continue
         series = [Series(time, residuals[rows][:, None]) for rows, time in columns]
@@ -67,18 +67,6 @@ def _shape(series: list[Series]) -> Estimate:
     all that is left is taken for noise, which can only widen intervals; the first is told from a mismatch."""
     smooth = estimate(series, recorded=False, orders=(1, 2), mismatch=False)
     return smooth if any(noise.order == 2 for noise in smooth.noises) else estimate(series, recorded=False)
-
-
-def _columns(problem: Problem, key: tuple[str, str]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Rows and times of every component of a channel, lost samples left out."""
-    channel = problem.predictor.sample.recordings[key[0]].channels[key[1]]
-    kept, width = problem.seen[key], max(1, np.asarray(channel.values).size // max(len(channel.time), 1))
-    first, time = problem.rows[key].start, np.asarray(channel.time, float)
-    found = []
-    for column in range(width):
-        mine = np.flatnonzero(kept % width == column)
-        found.append((first + mine, time[kept[mine] // width]))
-    return found
 
 
 def _noticed(r: Float[np.ndarray, " n"]) -> bool:

@@ -45,8 +45,8 @@ class Target:
         # Linear where there is no bound, also for moduli: a descent likes decades, a sampler a density near normal.
         b = problem.box
         self.box = Box(list(b.lower), list(b.upper), list(b.scale))
-        self.data = np.concatenate([problem.measured[key][problem.seen[key]] for key in problem.channels])
-        self._sigma = np.concatenate([np.full(len(problem.seen[k]), problem.sigma(k)) for k in problem.channels])
+        self.data = problem.series.y
+        self._sigma = problem.std
         self.density = jax.jit(self._density)
         self.many = jax.jit(jax.vmap(self._density, in_axes=(0, None)))
         self.likelihoods = jax.jit(jax.vmap(self.log_likelihood, in_axes=(0, None)))

@@ -7,11 +7,11 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from tissuejax.diagnosis.bench import Segment
 from tissuejax.diagnosis.foreseen import prediction_std
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.estimation.covariance import inflation
 from tissuejax.estimation.quantile import quantile
+from tissuejax.estimation.series import Segment
 from tissuejax.report.plot import BASE, HELD, INK, MODEL, Plot, grid, legend_below, scatter
 from tissuejax.report.scales import display, label
 

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from tissuejax.diagnosis.bench import Bench, Segment
+from tissuejax.diagnosis.bench import Bench
 from tissuejax.estimation.discrepancy import Series, loading_states
+from tissuejax.estimation.series import Segment
 
 SMOOTH = 60  # knots of the stress whose path counts: noise has a path too, and none that tells of anything
 

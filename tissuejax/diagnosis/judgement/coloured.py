@@ -12,11 +12,12 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from tissuejax.diagnosis.bench import Bench, Segment
+from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.judgement.marginal import Blocked
 from tissuejax.diagnosis.misfit import Misfit, estimated
 from tissuejax.estimation.noise import Noise
+from tissuejax.estimation.series import Segment
 
 
 def coloured(blocked: Blocked, bench: Bench, cut: Blocks, prediction: Float[np.ndarray, " N"]) -> Blocked | None:
