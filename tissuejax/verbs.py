@@ -98,7 +98,7 @@ def fit(
         search: method, number of starts and steps.
         first: for probings, the file of a surrogate (`tissuejax precompute`): it is fitted to the forces first, which
             takes seconds, and the simulations begin where it ends.
-        progress: told after every accepted step.
+        progress: advanced after every accepted step.
 
     Probings are fitted by `fitting.probed.fit_probed` (forward-mode least squares): from one start, whatever
     `multistart` says, with a volumetric energy K/2 (J-1)^2 if none is named.

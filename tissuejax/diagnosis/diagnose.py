@@ -109,10 +109,10 @@ def diagnose(
             raise unknown("effect", name, offers)
     remarks += slips(sample, (*fitted, *held_out))
     kind = experiment(sample.recordings[fitted[0]].experiment).kind
-    told_effects = [*([e.name for e in energy.effects] if isinstance(energy, Model) else ()), *_items(known)]
+    stated = [*([e.name for e in energy.effects] if isinstance(energy, Model) else ()), *_items(known)]
     base = energy.energy if isinstance(energy, Model) else energy
     base = base if isinstance(base, Energy) else named_energy(base, ogden_form)
-    physics = known_physics(told_effects, kind)
+    physics = known_physics(stated, kind)
     energy = label(energy if isinstance(energy, str) else base.name, physics)
     tried = None if effects is None else (*effects, *physics)
     keep = keep or (None if out is None else Path(out) / "runs")

@@ -1,7 +1,7 @@
-"""Physics that the base model has already: known effects, told with their values or fitted along with the energy.
+"""Physics that the base model has already: known effects, stated with their values or fitted along with the energy.
 
-What is told is no candidate any more. A value given is kept; what else the effect's form has is fitted with the base.
-So a model that a diagnosis repaired is diagnosed again, and weight is told instead of looked for.
+What is stated is no candidate any more. A value given is kept; what else the effect's form has is fitted with the base.
+So a model that a diagnosis repaired is diagnosed again, and weight is stated instead of looked for.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,7 +14,7 @@ Known = dict[str, dict[str, float]]  # by effect, the parameters whose values ar
 
 
 def known_physics(given: Sequence[str], kind: str) -> Known:
-    """What was told, by effect.
+    """What was stated, by effect.
 
     Args:
         given: "NAME" or "NAME.PARAMETER=VALUE" each.

@@ -112,7 +112,7 @@ class ProbingBench(Bench):
         self.base = tuple(self.free)
         guess = self.model.energy.initial_shear_modulus({p.split(".")[1]: v for p, v in self.start.items()})
         every = {e.effect.name: e.effect for e in probing_entries(1.0)}
-        lone = {n: e() for n, e in effects("probing").items() if n not in every}  # only ever told
+        lone = {n: e() for n, e in effects("probing").items() if n not in every}  # only ever stated
         self.runs.effects = every | lone
         ratio = self._scale()
         for path in self.base:

@@ -1,7 +1,7 @@
 """Candidates of probings: the effects in their forms, with priors on what a careful experimenter misjudges at most.
 
 An effect that is not named here has one form, with all its parameters and the shapes of its grid. Gravity is no
-candidate: its size is known (9.81 m/s^2), so it is told (`--with gravity`) and not looked for.
+candidate: its size is known (9.81 m/s^2), so it is stated (`--with gravity`) and not looked for.
 """
 
 import numpy as np

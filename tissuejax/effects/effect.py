@@ -49,8 +49,8 @@ class Effect(eqx.Module):
             what moves the probe needs no run of its own (`diagnosis.probing_free`).
         misjudged: by parameter, how far a careful experimenter misjudges it, standard deviation in its unit: the prior
             of an effect that only corrects what was noted.
-        standard: values that are meant where the effect is told without any (weight: 9.81 m/s^2).
-        candidate: False if its size is known beforehand (weight): nothing to be found, but something to be told.
+        standard: values that are meant where the effect is stated without any (weight: 9.81 m/s^2).
+        candidate: False if its size is known beforehand (weight): nothing to be found, but something to be stated.
 
     Hooks, in the order in which a material test applies them; each is the identity unless overridden:
         `stretch` (rig: what the specimen really saw), `energy` (added strain energy), `volume` (volume ratio from mean

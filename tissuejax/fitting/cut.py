@@ -77,7 +77,7 @@ def fit_cut(
 
     Args:
         model: energy, volumetric energy, cohesive law; `blade-friction` is added if it is not there.
-        known: what other tests told of the tissue: `energy.*`, `volumetric.*`, and whatever is to stay fixed.
+        known: what other tests say of the tissue: `energy.*`, `volumetric.*`, and whatever is to stay fixed.
         start: where to begin; what the balance tells of toughness and friction is tried beside it, and with either a
             strength by which faces part at half the blade's thickness. The descent begins with the best of them,
             and goes on to the next where it ends in no description of the record.

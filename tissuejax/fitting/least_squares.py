@@ -61,7 +61,7 @@ def descend(
         method: "levenberg-marquardt", "adam" or "lbfgs".
         max_steps: evaluations at most.
         tolerance: relative decrease of the misfit below which it stops.
-        on_accept: told evaluations, chi-square and values after every accepted step.
+        on_accept: called with evaluations, chi-square and values after every accepted step.
         to_beat: cost another start reached.
     """
     x = problem.vector(start if start is not None else problem.start)
@@ -131,7 +131,7 @@ def fit(
         start: values to begin with, taken as they are; None solves for the moduli first.
         search: method, number of starts and steps.
         holdout: recordings of the sample, outside the problem, to predict and score.
-        on_accept: told evaluations, chi-square and values after every accepted step.
+        on_accept: called with evaluations, chi-square and values after every accepted step.
 
     Raises:
         InputError: a start at which the model has no finite prediction, an unknown method or recording.

@@ -35,7 +35,7 @@ from tissuejax.fitting.scores import scores
 from tissuejax.fitting.simulated import Simulated
 from tissuejax.progress import Progress, Silent
 
-METHOD = "sparing"
+METHOD = "levenberg-marquardt"
 LAST = 15.0  # standard errors: after a step shorter than this the rest is left to the chord steps of the end
 
 
@@ -88,8 +88,8 @@ def fit_probed(
         checkpoint: a file that keeps the last accepted values; a fit of the same problem goes on from there.
         max_steps: Jacobians at most.
         fraction: converged once the next step is shorter than this many standard errors.
-        progress: told after every run.
-        on_accept: told runs, chi-square and values after every accepted step.
+        progress: advanced after every run.
+        on_accept: called with runs, chi-square and values after every accepted step.
 
     Raises:
         UnstableSimulation: the start can't be simulated.
@@ -170,11 +170,11 @@ def fit_probed(
 
 
 class Runs(LeastSquares):
-    """The simulations of a fit: what the descent asks for, in its own coordinates y, told and counted.
+    """The simulations of a fit: what the descent asks for, in its own coordinates y, shown and counted.
 
     Attributes:
         swift: the problem simulated fast, for residuals and derivatives of the descent.
-        told: forward runs made so far.
+        simulated: forward runs made so far.
         jacobians: how many were computed.
     """
 
@@ -214,14 +214,14 @@ class Runs(LeastSquares):
         return self.coarse.linearised(self.problem.values(x))[1]
 
     def accepted(self, n: int, cost: float, y: Float[np.ndarray, " p"]) -> None:
-        """Keep an accepted step, show it and tell it."""
-        self._told(n, cost, self.problem.values(self.problem.box.bounded(y)[0]), closing=False)
+        """Keep an accepted step and show it."""
+        self._accepted(n, cost, self.problem.values(self.problem.box.bounded(y)[0]), closing=False)
 
     def closer(self, x: Float[np.ndarray, " p"], cost: float) -> None:
         """The same for a chord step of the end."""
-        self._told(self.simulated.runs + self.jacobians, cost, self.problem.values(x), closing=True)
+        self._accepted(self.simulated.runs + self.jacobians, cost, self.problem.values(x), closing=True)
 
-    def _told(self, n: int, cost: float, values: dict[str, float], closing: bool) -> None:
+    def _accepted(self, n: int, cost: float, values: dict[str, float], closing: bool) -> None:
         self.kept.keep(values, closing)
         self.stage.advance(0, note=f"chi-square {2 * cost:.5g}")
         if self.on_accept is not None:

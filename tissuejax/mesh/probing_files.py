@@ -181,7 +181,7 @@ def _tabled(file: str, path: Path, height: float) -> list[Recording]:
 
 
 def _noise(series: Series, unit: str, what: str) -> float:
-    """The noise level as told, or the median over all components of what neighbouring samples differ by."""
+    """The noise level as stated, or the median over all components of what neighbouring samples differ by."""
     if series.noise is not None:
         return quantity(series.noise, unit, f"{what}.noise")
     flat = series.values.reshape(len(series.time), -1)

@@ -38,7 +38,7 @@ def vector_over_time(spec: object, side: Path, what: str, si: str) -> Series:
         si: unit wanted.
 
     Raises:
-        InputError: a key or column that isn't there, a unit that isn't told, times that don't increase.
+        InputError: a key or column that isn't there, a unit that isn't stated, times that don't increase.
     """
     spec = _checked(spec, what)
     path = resolve(str(spec["file"]), side)

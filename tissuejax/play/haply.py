@@ -1,7 +1,7 @@
 """A client of the Haply service's websocket: position in, force out, each tick.
 
 The service sends a JSON state about every device a thousand times a second and takes a JSON command back. This client
-is Python, so its rate is measured and told; forces pass the same limits as in the C loop.
+is Python, so its rate is measured and reported; forces pass the same limits as in the C loop.
 """
 
 import asyncio

@@ -1,7 +1,7 @@
 """The haptic loop in its own process, and how late it was.
 
 Lateness is against times that lie 1 / rate apart from the start, on the monotonic clock; every sample is kept, and
-after a miss nothing is set back. Kernel, policy and load are told beside the numbers, since these decide.
+after a miss nothing is set back. Kernel, policy and load are reported beside the numbers, since these decide.
 """
 
 import os

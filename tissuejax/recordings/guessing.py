@@ -75,7 +75,7 @@ class Guess:
 
     @property
     def lacking(self) -> tuple[str, ...]:
-        """Sizes that the side file needs and nobody has told."""
+        """Sizes that the side file needs and nobody has given."""
         return tuple(k for k, v in self.specimen.items() if v == "?")
 
 

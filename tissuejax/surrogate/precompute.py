@@ -79,7 +79,7 @@ def precompute(
     felt = max(float(np.linalg.norm(r.force, axis=1).max()) for r in tests)
     if wanted is not None and felt <= error.FELT:
         raise InputError(
-            f"--error {100 * wanted:g}: the greatest held-out force is {felt:.3f} N, and errors are told of forces "
+            f"--error {100 * wanted:g}: the greatest held-out force is {felt:.3f} N, and errors are stated for forces "
             f"over {error.FELT:g} N: take a larger --depth, or leave --error out"
         )
     rounds = []

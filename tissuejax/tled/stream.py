@@ -1,7 +1,7 @@
 """Long runs in chunks: watched while they run, written as they go, stopped and resumed bit for bit.
 
 A run is cut into chunks of `CHUNK` frames. After each one the failure check is looked at, channels and state are
-appended to one HDF5 file, and progress is told. A run that was stopped goes on from the last chunk in the file, and
+appended to one HDF5 file, and progress is shown. A run that was stopped goes on from the last chunk in the file, and
 because a run that was not stopped passes through the same chunks, both give the same bits. `to_xdmf` and `to_vtu`
 make the stored states readable in ParaView.
 """
@@ -46,7 +46,7 @@ def run_to_file(
         scene: frames are rounded up to whole chunks.
         path: `/channels/*` grow by frames, `/states/displacement/K` (N, 3) after chunk K, `/resume` is the last state;
             `/probe` is the path of a round probe.
-        progress: told after each chunk.
+        progress: advanced after each chunk.
         chunks: stop after so many (None: to the end).
         chunk: frames in each; a run is gone on with in the chunks it began with.
 

@@ -45,7 +45,7 @@ def compiled(name: str, shared: bool = False) -> Path:
     """The program (or shared library) made of `name`.
 
     Raises:
-        InputError: no compiler, or one that refuses the file (its words are told).
+        InputError: no compiler, or one that refuses the file (its words are shown).
     """
     cc, text = compiler(), source(name).read_bytes() + source("tissuejax_force.h").read_bytes()
     key = hashlib.sha256(text + repr((cc, FLAGS, shared)).encode()).hexdigest()[:16]
