@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tissuejax.diagnosis.catalogue import Sizes
 from tissuejax.diagnosis.material import MaterialBench
 from tissuejax.diagnosis.untimed import timed, without_clock
+from tissuejax.effects.form import Sizes
 from tissuejax.energies.catalogue import energy
 from tissuejax.recordings.files import read
 

@@ -24,7 +24,7 @@ class Engine(abc.ABC):
 
     @abc.abstractmethod
     def run(self, store: Store, tasks: list[Task], workers: int, report: Report, where: str | None = None) -> None:
-        """Work through the tasks; `report` is called with a short row of each. Cases lost with a worker are left missing.
+        """Work through the tasks; `report` is called with a short row of each. What died is left missing.
 
         Args:
             workers: how many at once.

@@ -21,9 +21,10 @@ from jaxtyping import Array, Float
 from tissuejax.cache.key import described
 from tissuejax.cache.programs import Kept
 from tissuejax.diagnosis.bench import Bench, Candidate, Free
-from tissuejax.diagnosis.catalogue import Entry, Sizes, entries
+from tissuejax.diagnosis.catalogue import Entry, entries
 from tissuejax.diagnosis.judgement.blocks import State, strain
 from tissuejax.diagnosis.periodogram import lines
+from tissuejax.effects.form import Sizes
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.energies.energy import Energy
 from tissuejax.estimation.series import Series
@@ -33,13 +34,11 @@ from tissuejax.model import Model
 from tissuejax.recordings.recording import Sample
 
 STRESS_CHANNEL = "nominal_stress"
-MEMORIES = ("viscoelasticity", "softening")
 CYCLES = 2.5  # periods that the longest recording must hold to show one
 SHORTEST = 128  # samples that a series is lengthened to
 STEP = 1e-6  # of a parameter's scale
 SIZE = 10.0  # by which the base's defaults may be off before they are brought to size
 STRESS = 0.05  # of the largest stress: the least scale of a modulus or an offset
-ADDED = ("effects.drift.", "effects.periodic.")  # added to the stress last: their derivative needs nothing else
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,17 +157,19 @@ class MaterialBench(Bench):
         recordings = (*self.fitted, *self.held_out)
         self._energy, self._entries = energy, found
         self._built: dict[tuple[str, ...], Program] = {}
-        self._full = [e.effect for e in found if e.spare is not None]
+        self._full = [e.effect for e in found if e.simple is not None]
         self._searched = {e.effect.name for e in found if e.searches}
-        heavy = self._searched.union(MEMORIES)
+        self._remembering = {e.effect.name for e in found if e.effect.history}
+        self._added = tuple(f"effects.{e.effect.name}." for e in found if e.effect.added)
+        heavy = self._searched | self._remembering
         self._heavy = {f"effects.{e.effect.name}.": e.effect.name for e in found if e.effect.name in heavy}
         whole = Model(energy, None, tuple(e.effect for e in found)).across(recordings)
-        self._rich = {
+        self._full = {
             f"effects.{e.effect.name}.{p.name}": e.effect.name
             for e in found
-            if e.spare is not None
+            if e.simple is not None
             for p in e.effect.parameters
-            if p.name not in {q.name for q in e.spare.parameters}
+            if p.name not in {q.name for q in e.simple.parameters}
         }
         self._neutral = {p: d.default for p, d in whole.declared.items()}
         for entry in found:
@@ -212,14 +213,16 @@ class MaterialBench(Bench):
     def _program(self, values: Mapping[str, float]) -> Program:
         """The program for a set of moving paths: all that costs nothing at once, and of the others what takes part."""
         parts = {d for p in values for prefix, d in self._heavy.items() if p.startswith(prefix)}
-        if parts.intersection(MEMORIES):  # together: one program fewer to compile
-            parts |= {e.effect.name for e in self._entries if e.effect.name in MEMORIES}
-        rich = {self._rich[p] for p in values if p in self._rich}
-        key = (*sorted(parts), *sorted(rich))
+        if parts & self._remembering:  # together: one program fewer to compile
+            parts |= self._remembering
+        full = {self._needs_full[p] for p in values if p in self._needs_full}
+        key = (*sorted(parts), *sorted(full))
         if key not in self._built:
             light = [e for e in self._entries if e.effect.name not in self._heavy.values()]
             taking = [*light, *(e for e in self._entries if e.effect.name in parts)]
-            effects = tuple(e.spare if e.spare is not None and e.effect.name not in rich else e.effect for e in taking)
+            effects = tuple(
+                e.simple if e.simple is not None and e.effect.name not in full else e.effect for e in taking
+            )
             model = Model(self._energy, None, effects)
             places = {n: self._places(model, n) for n in self._tests}
             self._built[key] = Program(compiled(model), places, self._price(model))
@@ -263,7 +266,7 @@ class MaterialBench(Bench):
     def _price(self, model: Model) -> float:
         """What a prediction costs beside that of the base model, from measured times: searches multiply."""
         names, full = {e.name for e in model.effects}, {e.name for e in model.effects if e in self._full}
-        memory, fibres = bool(names.intersection(MEMORIES)), "anisotropy" in names
+        memory, fibres = bool(names & self._remembering), "anisotropy" in names
         inner = 1.0 + 1.5 * memory + 4 * fibres + 3 * bool(full)
         if fibres and "energy-form" in full:  # powers of principal stretches, which fibres take off the axes
             inner = 90.0
@@ -303,8 +306,8 @@ class MaterialBench(Bench):
         """See `Bench.nested`: memories run side by side and count once."""
         paths = [p for key in keys for p in self.candidates[key].paths]
         heavy = {d for p in paths for prefix, d in self._heavy.items() if p.startswith(prefix)}
-        rich = any(self._rich.get(p, "anisotropy") != "anisotropy" for p in paths)
-        return len(heavy.difference(MEMORIES)) + bool(heavy.intersection(MEMORIES)) + rich
+        full = any(self._needs_full.get(p, "anisotropy") != "anisotropy" for p in paths)
+        return len(heavy - self._remembering) + bool(heavy & self._remembering) + full
 
     def _step(self, path: str, value: float) -> float:
         f = self.free[path]
@@ -319,7 +322,7 @@ class MaterialBench(Bench):
         steps = np.array([self._step(p, at[p]) for p in paths])
         pairs = []
         for p, h in zip(paths, steps):
-            known = {k: v for k, v in at.items() if k.startswith(ADDED)} if p.startswith(ADDED) else at
+            known = {k: v for k, v in at.items() if k.startswith(self._added)} if p.startswith(self._added) else at
             pairs.append((known, {**known, p: at[p] + h}))
         return self._differences(pairs, recordings) / steps
 
@@ -329,7 +332,11 @@ class MaterialBench(Bench):
         """See `Bench.columns`. While an effect is neutral its shapes mean nothing: all start from one prediction."""
         pairs, steps, values = [], [], {**self.known, **values}
         for setting, path in settings:
-            known = {k: v for k, v in values.items() if k.startswith(ADDED)} if path.startswith(ADDED) else values
+            known = (
+                {k: v for k, v in values.items() if k.startswith(self._added)}
+                if path.startswith(self._added)
+                else values
+            )
             at = {path: self.start[path], **known, **setting}
             steps.append(self._step(path, at[path]))
             acting = {k: v for k, v in setting.items() if k in self._amplitudes and v != self.start[k]}

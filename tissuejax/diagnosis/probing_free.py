@@ -27,14 +27,6 @@ ASIDE = {
     "y": ("effects.registration.dy", 3e-4),
     "z": ("effects.contact-offset.depth", -3e-4),
 }
-MOVERS = {
-    "effects.registration.dx",
-    "effects.registration.dy",
-    "effects.contact-offset.depth",
-    "effects.contact-offset.delay",
-    "effects.machine-compliance.compliance",
-    *(f"effects.support-motion.{w}" for w in ("sin", "cos", "sin2", "cos2", "lean_x", "lean_y", "frequency")),
-}
 
 
 def sensed(bench: "ProbingBench", path: str) -> bool:
@@ -50,7 +42,7 @@ def _silent(effect: Effect) -> bool:
 
 def moves(bench: "ProbingBench", at: Mapping[str, float], path: str) -> bool:
     """Whether the derivative follows from a displaced probe: nothing that remembers, and no rig in between."""
-    if ".".join(path.split(".")[:3]) not in MOVERS:
+    if not path.startswith("effects.") or path.split(".")[2] not in bench.runs.effects[path.split(".")[1]].displaces:
         return False
     on = {p.split(".")[1] for p, v in at.items() if p.startswith("effects.") and v != 0 and _amplitude(bench, p)}
     return not any(type(bench.runs.effects[n]).remembers and not _silent(bench.runs.effects[n]) for n in on)

@@ -24,24 +24,8 @@ from tissuejax.experiments import workers
 from tissuejax.experiments.probing_predictor import ProbingPredictor
 from tissuejax.model import Model
 
-# The first group is in every program. Histories take long to run and stay apart.
-GROUPS = (
-    (
-        "aging",
-        "clock-lag",
-        "contact-offset",
-        "force-drift",
-        "inclusion",
-        "machine-compliance",
-        "registration",
-        "support-motion",
-    ),
-    ("base-slip", "capsule"),
-    ("compressibility", "softening", "viscoelasticity"),
-    ("adhesion", "friction"),
-    ("anisotropy", "energy-form"),
-    ("gravity",),
-)
+# Effects compiled together (`Effect.group`). The first group is in every program; histories take long and stay apart.
+TOGETHER = ("rig", "base", "history", "contact", "law")
 SMALLER = 2.0  # times: the step of a run that broke down
 BATCH = 12  # runs after which progress is reported
 ROUGH = (12, 12, 5)  # elements of the mesh for differences
@@ -140,8 +124,9 @@ class Runs:
 
     def _predictor(self, kind: str, values: Sequence[tuple[str, float]], finer: float = 1.0) -> ProbingPredictor:
         named = {p.split(".")[1] for p, _ in values if p.startswith("effects.")}
-        groups = tuple(g for i, g in enumerate(GROUPS) if i == 0 or named.intersection(g))
-        lone = tuple(sorted(named.difference(*GROUPS)))
+        of = [tuple(n for n in sorted(self.effects) if self.effects[n].group == group) for group in TOGETHER]
+        groups = tuple(g for i, g in enumerate(of) if i == 0 or named.intersection(g))
+        lone = tuple(sorted(named.difference(*of)))
         if (kind, groups, lone, finer) not in self._models:
             chosen = [self.effects[n] for n in (*sum(groups, ()), *lone) if n in self.effects]
             one = self.ready[kind]

@@ -6,6 +6,7 @@ from typing import ClassVar
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.tled.scene import Scene
@@ -20,12 +21,18 @@ class Adhesion(Effect):
 
     name: ClassVar[str] = "adhesion"
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    group: ClassVar[str] = "contact"
     reveals: ClassVar[str] = "pulling force at the end of the retraction"
     blind: ClassVar[str] = "recordings without a retraction; material tests"
     words: ClassVar[tuple[str, ...]] = ("the tissue sticks to the probe with up to {strength}",)
     source: ClassVar[str] = "cohesive traction over a gap, as in Lister 2012, 3.2.1"
     amplitudes: ClassVar[tuple[str, ...]] = ("strength",)
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"reach": (1e-4, 3e-4)}
+
+    @classmethod
+    def in_probings(cls, energy: float) -> Offer:
+        """See `Effect.in_probings`."""
+        return Offer(cls(), (Form("", ("strength", "reach"), {"reach": (1e-4, 3e-4, 8e-4)}),))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

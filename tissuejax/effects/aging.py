@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer, Sizes
 from tissuejax.effects.history import dying
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.effects.probing_test import ProbingTest
@@ -28,6 +29,7 @@ class Aging(Effect):
 
     name: ClassVar[str] = "aging"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    group: ClassVar[str] = "rig"
     remembers: ClassVar[bool] = False
     reveals: ClassVar[str] = "later recordings stiffer or softer than earlier ones"
     blind: ClassVar[str] = "a single short recording"
@@ -35,6 +37,22 @@ class Aging(Effect):
     needs: ClassVar[str] = "times"
     source: ClassVar[str] = "first-order drift of the modulus"
     amplitudes: ClassVar[tuple[str, ...]] = ("rate",)
+
+    @classmethod
+    def in_material_tests(cls, sizes: Sizes) -> Offer:
+        """See `Effect.in_material_tests`."""
+        ends = {"settling": (1 / sizes.session, -0.5 / sizes.session)}
+        forms = (
+            Form("", ("rate",)),
+            Form("straight", ("rate", "straight"), {"straight": (1.0,)}, nominated=False),
+            Form("settling", ("rate", "settling"), ends, nominated=False),
+        )
+        return Offer(cls(), forms)
+
+    @classmethod
+    def in_probings(cls, energy: float) -> Offer:
+        """See `Effect.in_probings`."""
+        return Offer(cls(), (Form("", ("rate",)),))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer, Sizes
 from tissuejax.energies.barrier import expm1
 from tissuejax.energies.strain import Strain
 from tissuejax.parameters import Parameter
@@ -28,6 +29,7 @@ class Anisotropy(Effect):
 
     name: ClassVar[str] = "anisotropy"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    group: ClassVar[str] = "law"
     remembers: ClassVar[bool] = False
     reveals: ClassVar[str] = "stiffness that differs between directions"
     blind: ClassVar[str] = "uniaxial recordings in a single direction"
@@ -44,6 +46,37 @@ class Anisotropy(Effect):
 
     families: int = 1
     crimped: bool = False
+
+    @classmethod
+    def in_material_tests(cls, sizes: Sizes) -> Offer:
+        """See `Effect.in_material_tests`."""
+        stretched = sizes.stretched
+        steepest = 10 / stretched**2  # e^10 at the largest stretch
+        # steep fibres don't show that they are crimped: nothing is left of them
+        mild = {"k2": (min(1.0, steepest / 10),)}
+        most, fibre = {"k2": steepest}, ("k1", "k2", "angle")
+        # along an axis of the test an angle has no slope to leave it by
+        plane = {"angle": tuple(0.15 + np.arange(4) * np.pi / 4), **mild}
+        # one family may lie along an axis, and two alike about it
+        aside = {"spread": (0.4,), "angle": (0.4, 1.2, 2.0, 2.7)}
+        crimped = {"onset": (0.1 * stretched, 0.4 * stretched), **mild}
+        both = {"onset": (0.05 * stretched,), "spread": (0.05, 0.4), **mild}
+        further = (
+            ("any direction", ("elevation",), {"elevation": (0.3, -0.8)}),
+            ("two families", ("spread",), aside),
+            ("crimped", ("onset",), crimped),
+            ("crimped, two families", ("spread", "onset"), both),
+        )
+        forms = (
+            Form("in the xy plane", fibre, plane, most=most),
+            *(Form(n, (*fibre, *more), grid, nominated=False, most=most) for n, more, grid in further),
+        )
+        return Offer(cls(families=2, crimped=True), forms, simple=cls())  # a second family costs half as much again
+
+    @classmethod
+    def in_probings(cls, energy: float) -> Offer:
+        """See `Effect.in_probings`."""
+        return Offer(cls(), (Form("", ("k1", "angle"), {"angle": tuple(np.arange(4) * np.pi / 4)}),))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -22,6 +22,7 @@ class BaseSlip(Effect):
 
     name: ClassVar[str] = "base-slip"
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    group: ClassVar[str] = "base"
     reveals: ClassVar[str] = "markers spread sideways more than a bonded base allows"
     blind: ClassVar[str] = "depths small against the thickness; material tests"
     words: ClassVar[tuple[str, ...]] = ("the base slips by {compliance} under shear", "and creeps by {fluidity}")

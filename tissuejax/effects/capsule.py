@@ -23,6 +23,7 @@ class Capsule(Effect):
 
     name: ClassVar[str] = "capsule"
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    group: ClassVar[str] = "base"
     remembers: ClassVar[bool] = False
     reveals: ClassVar[str] = "surface dips too wide for the depth: markers far from the probe move too much"
     blind: ClassVar[str] = "force alone at one depth; material tests (the specimen is cut from inside)"

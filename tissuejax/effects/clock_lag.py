@@ -26,6 +26,7 @@ class ClockLag(Effect):
 
     name: ClassVar[str] = "clock-lag"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing", "cutting"})
+    group: ClassVar[str] = "rig"
     reveals: ClassVar[str] = "residuals proportional to the rate of what was done, none in holds"
     blind: ClassVar[str] = (
         "ramps at one rate without holds; holds alone; probings without markers; the steady middle of a cut"

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer, Sizes
 from tissuejax.effects.history import fading
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.effects.probing_test import ProbingTest
@@ -30,6 +31,8 @@ class Compressibility(Effect):
 
     name: ClassVar[str] = "compressibility"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    searches: ClassVar[bool] = True
+    group: ClassVar[str] = "history"
     reveals: ClassVar[str] = "disagreement between tests of unlike constraint, relaxation that is absent in shear"
     blind: ClassVar[str] = "simple shear; uniaxial tests alone"
     words: ClassVar[tuple[str, ...]] = (
@@ -42,6 +45,18 @@ class Compressibility(Effect):
     timed: ClassVar[tuple[str, ...]] = ("drained", "time")
     slow: ClassVar[tuple[str, ...]] = ("drained", "time")
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"time": (1.0, 5.0, 25.0)}
+
+    @classmethod
+    def in_material_tests(cls, sizes: Sizes) -> Offer:
+        """See `Effect.in_material_tests`."""
+        free = ("immediate", "drained", "time")
+        other = Form("another volumetric law", (*free, "power"), {"power": (1.0,)}, nominated=False)
+        return Offer(cls(), (Form("", free, dict(cls.grid)), other))
+
+    @classmethod
+    def in_probings(cls, energy: float) -> Offer:
+        """See `Effect.in_probings`."""
+        return Offer(cls(), (Form("draining", ("drained", "time"), {"time": (4.0,)}),))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.tled.scene import Scene
@@ -22,6 +23,8 @@ class ContactOffset(Effect):
 
     name: ClassVar[str] = "contact-offset"
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    group: ClassVar[str] = "rig"
+    displaces: ClassVar[tuple[str, ...]] = ("depth", "delay")
     remembers: ClassVar[bool] = False
     misjudged: ClassVar[Mapping[str, float]] = {"depth": 7e-4, "delay": 0.1}
     reveals: ClassVar[str] = "force begins too early or too late, by the same depth on the way in and out"
@@ -31,6 +34,12 @@ class ContactOffset(Effect):
     amplitudes: ClassVar[tuple[str, ...]] = ("depth", "delay")
     order: ClassVar[int] = 0
     separate: bool = False
+
+    @classmethod
+    def in_probings(cls, energy: float) -> Offer:
+        """See `Effect.in_probings`."""
+        each = Form("each recording", ("depth",), each=("depth",))
+        return Offer(cls(separate=True), (Form("delay", ("delay",)), Form("depth", ("depth",)), each))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

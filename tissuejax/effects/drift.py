@@ -6,6 +6,7 @@ from typing import ClassVar
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer, Sizes
 from tissuejax.effects.history import dying
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.parameters import Parameter
@@ -24,6 +25,7 @@ class Drift(Effect):
 
     name: ClassVar[str] = "drift"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous"})
+    added: ClassVar[bool] = True
     reveals: ClassVar[str] = "stress at rest, growing in time"
     blind: ClassVar[str] = "recordings without samples at rest; a wrong gain is never seen"
     words: ClassVar[tuple[str, ...]] = ("the load cell's zero is off by {offset}", "it drifts by {rate}")
@@ -33,6 +35,17 @@ class Drift(Effect):
     timed: ClassVar[tuple[str, ...]] = ("rate", "settling")
     slow: ClassVar[tuple[str, ...]] = ("rate", "settling")
     separate: bool = False
+
+    @classmethod
+    def in_material_tests(cls, sizes: Sizes) -> Offer:
+        """See `Effect.in_material_tests`."""
+        forms = (
+            Form("offset", ("offset",)),
+            Form("offset and rate", ("offset", "rate")),
+            Form("each recording", ("offset", "rate"), each=("offset", "rate")),
+            Form("dying", ("offset", "rate", "settling"), {"settling": (4 / sizes.recording,)}, nominated=False),
+        )
+        return Offer(cls(separate=True), forms)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -13,6 +13,7 @@ import equinox as eqx
 from jaxtyping import Array, Float
 
 from tissuejax.effects.cutting_test import Cut
+from tissuejax.effects.form import Offer, Sizes
 from tissuejax.effects.material_test import MaterialTest, Stress
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.energies.strain import Strain
@@ -50,6 +51,12 @@ class Effect(eqx.Module):
         misjudged: by parameter, how far a careful experimenter misjudges it, standard deviation in its unit: the prior
             of an effect that only corrects what was noted.
         standard: values that are meant where the effect is stated without any (weight: 9.81 m/s^2).
+        searches: of material tests: whether it turns every prediction into a search.
+        history: of material tests: whether its stress has a past, which a compiled program holds or not.
+        added: of material tests: whether it is added to the reported stress last, so that its derivative needs nothing
+            else.
+        group: of probings: effects of one group are compiled together ("rig": in every program; "" alone).
+        displaces: of probings: parameters that only move the probe towards the tissue (`diagnosis.probing_free`).
         candidate: False if its size is known beforehand (weight): nothing to be found, but something to be stated.
 
     Hooks, in the order in which a material test applies them; each is the identity unless overridden:
@@ -76,12 +83,27 @@ class Effect(eqx.Module):
     remembers: ClassVar[bool] = True
     misjudged: ClassVar[Mapping[str, float]] = {}
     standard: ClassVar[Mapping[str, float]] = {}
+    searches: ClassVar[bool] = False
+    history: ClassVar[bool] = False
+    added: ClassVar[bool] = False
+    group: ClassVar[str] = ""
+    displaces: ClassVar[tuple[str, ...]] = ()
     candidate: ClassVar[bool] = True
 
     @property
     @abc.abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
         """Declared parameters; an amplitude has default 0 (neutral)."""
+
+    @classmethod
+    def in_material_tests(cls, sizes: Sizes) -> Offer:
+        """What a diagnosis of material tests tries; in one form, all parameters at once, by default."""
+        return Offer.whole(cls())
+
+    @classmethod
+    def in_probings(cls, energy: float) -> Offer:
+        """The same of probings; `energy` is the typical strain energy under the probe, Pa."""
+        return Offer.whole(cls())
 
     @property
     def neutral(self) -> dict[str, float]:

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer, Sizes
 from tissuejax.energies.barrier import expm1
 from tissuejax.energies.strain import Strain
 from tissuejax.parameters import Parameter
@@ -27,6 +28,7 @@ class EnergyForm(Effect):
 
     name: ClassVar[str] = "energy-form"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    group: ClassVar[str] = "law"
     remembers: ClassVar[bool] = False
     reveals: ClassVar[str] = "misfit that depends on stretch alone, not on its past or rate"
     blind: ClassVar[str] = "small strains"
@@ -41,6 +43,31 @@ class EnergyForm(Effect):
     )
     source: ClassVar[str] = "Rivlin and Saunders 1951; Demiray 1972; Ogden 1972"
     terms: tuple[str, ...] = ("C20", "C30", "C01", "C02", "exponential")
+
+    @classmethod
+    def in_material_tests(cls, sizes: Sizes) -> Offer:
+        """See `Effect.in_material_tests`."""
+        exponent = {"exponent": tuple(x / sizes.strain**2 for x in (0.3, 1.5))}
+        steepest = {"exponent": 4 / sizes.strain**2}  # e^12 at the largest strain: I1bar - 3 is about 3 strain^2
+        power = {"grid": {"power": (-8.0, 10.0)}, "most": {"power": 8 / sizes.strain}}
+        alone = ("cubic", "second invariant", "exponential")
+        forms = (
+            Form("cubic", ("C30",)),
+            Form("second invariant", ("C01",)),
+            Form("exponential", ("exponential", "exponent"), exponent, most=steepest),
+            Form("cubic and second invariant", ("C30", "C01"), nominated=False),
+            Form("all", ("C30", "C01", "C02", "exponential", "exponent"), nominated=False, most=steepest),
+            Form("stretch power", ("ogden", "power"), nominated=False, beside=alone, **power),
+        )
+        terms = ("C30", "C01", "C02", "exponential")
+        return Offer(
+            cls((*terms, "ogden")), forms, simple=cls(terms)
+        )  # principal stretches cost as much as all the rest
+
+    @classmethod
+    def in_probings(cls, energy: float) -> Offer:
+        """See `Effect.in_probings`."""
+        return Offer(cls(terms=("C30", "C01")), (Form("", ("C30", "C01")),))
 
     @property
     def amplitudes(self) -> tuple[str, ...]:

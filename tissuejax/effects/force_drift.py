@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.recordings.recording import Channel
@@ -23,6 +24,7 @@ class ForceDrift(Effect):
 
     name: ClassVar[str] = "force-drift"
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    group: ClassVar[str] = "rig"
     reveals: ClassVar[str] = "force out of contact, growing in time"
     blind: ClassVar[str] = "probings that begin in contact; a wrong gain is never seen"
     words: ClassVar[tuple[str, ...]] = (
@@ -33,6 +35,12 @@ class ForceDrift(Effect):
     order: ClassVar[int] = 0
     amplitudes: ClassVar[tuple[str, ...]] = tuple(f"{a}_{c}" for a in ("offset", "rate") for c in "xyz")
     separate: bool = False
+
+    @classmethod
+    def in_probings(cls, energy: float) -> Offer:
+        """See `Effect.in_probings`."""
+        axes = cls.amplitudes
+        return Offer(cls(separate=True), (Form("", axes), Form("each recording", axes, each=axes)))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -6,6 +6,7 @@ from typing import ClassVar
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.tled.scene import Scene
@@ -24,6 +25,7 @@ class Friction(Effect):
 
     name: ClassVar[str] = "friction"
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    group: ClassVar[str] = "contact"
     reveals: ClassVar[str] = "lateral force against sliding, and its sign change on the way back"
     blind: ClassVar[str] = "a shallow straight press on a level surface; material tests"
     words: ClassVar[tuple[str, ...]] = ("the tissue rubs on the probe with a coefficient of {coefficient}",)
@@ -31,6 +33,14 @@ class Friction(Effect):
         "Coulomb; Lister 2012, 2.2.4 assumes 0.1; the give before sliding: Dahl 1968, Aerospace report TOR-0158"
     )
     amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
+
+    @classmethod
+    def in_probings(cls, energy: float) -> Offer:
+        """See `Effect.in_probings`."""
+        # where the surface sticks, a rigid stick of weak friction passes for a giving one of strong friction
+        grid = {"coefficient": (0.45,), "give": (2e-8,)}  # m/Pa: 500 Pa move by 10 micrometres
+        giving = Form("giving", ("coefficient", "give"), grid, nominated=False)
+        return Offer(cls(), (Form("", ("coefficient",)), giving))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.tled.scene import Scene
@@ -23,6 +24,7 @@ class Inclusion(Effect):
 
     name: ClassVar[str] = "inclusion"
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    group: ClassVar[str] = "rig"
     remembers: ClassVar[bool] = False
     reveals: ClassVar[str] = "one site stiffer or softer than the rest, the more the deeper the probe"
     blind: ClassVar[str] = "sites farther off than about twice its depth; material tests"
@@ -32,6 +34,13 @@ class Inclusion(Effect):
     source: ClassVar[str] = "a field of stiffness, as in elastography"
     amplitudes: ClassVar[tuple[str, ...]] = ("contrast",)
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"radius": (3e-3, 5e-3, 8e-3)}
+
+    @classmethod
+    def in_probings(cls, energy: float) -> Offer:
+        """See `Effect.in_probings`."""
+        round_ = ("contrast", "x", "y", "z", "radius")
+        flat = Form("flat", (*round_, "flatness"), nominated=False)
+        return Offer(cls(), (Form("round", round_, {"radius": (6e-3,)}), flat))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

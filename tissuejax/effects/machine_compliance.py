@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 
 from tissuejax.effects.cutting_test import Cut
 from tissuejax.effects.effect import Effect, Respond
+from tissuejax.effects.form import Form, Offer, Sizes
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
@@ -31,6 +32,9 @@ class MachineCompliance(Effect):
 
     name: ClassVar[str] = "machine-compliance"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing", "cutting"})
+    searches: ClassVar[bool] = True
+    group: ClassVar[str] = "rig"
+    displaces: ClassVar[tuple[str, ...]] = ("compliance",)
     remembers: ClassVar[bool] = False
     reveals: ClassVar[str] = (
         "apparent stiffness that falls with load; specimens of unlike size disagree; deeper cuts set in later"
@@ -41,6 +45,17 @@ class MachineCompliance(Effect):
     source: ClassVar[str] = "Kalidindi, Abusafieh and El-Danaf 1997"
     order: ClassVar[int] = 0
     amplitudes: ClassVar[tuple[str, ...]] = ("compliance",)
+
+    @classmethod
+    def in_material_tests(cls, sizes: Sizes) -> Offer:
+        """See `Effect.in_material_tests`."""
+        stiffening = Form("stiffening", ("compliance", "bend"), {"bend": (3 / sizes.force,)}, nominated=False)
+        return Offer(cls(), (Form("", ("compliance",)), stiffening))
+
+    @classmethod
+    def in_probings(cls, energy: float) -> Offer:
+        """See `Effect.in_probings`."""
+        return Offer(cls(), (Form("", ("compliance",)),))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

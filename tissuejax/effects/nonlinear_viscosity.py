@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer, Sizes
 from tissuejax.effects.material_test import MaterialTest, Stress
 from tissuejax.parameters import Parameter
 
@@ -26,6 +27,7 @@ class NonlinearViscosity(Effect):
 
     name: ClassVar[str] = "nonlinear-viscosity"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous"})
+    searches: ClassVar[bool] = True
     reveals: ClassVar[str] = "relaxation that is quicker from larger strain, hysteresis at every rate"
     blind: ClassVar[str] = "a single ramp at constant rate"
     words: ClassVar[tuple[str, ...]] = ("{g:%} of the stress flows, with {tau} at small load and faster from {stress}",)
@@ -35,6 +37,13 @@ class NonlinearViscosity(Effect):
     amplitudes: ClassVar[tuple[str, ...]] = ("g",)
     times: ClassVar[tuple[str, ...]] = ("tau",)
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"tau": (1.0, 10.0), "stress": (0.2,), "exponent": (3.0,)}
+
+    @classmethod
+    def in_material_tests(cls, sizes: Sizes) -> Offer:
+        """See `Effect.in_material_tests`."""
+        grid = {"tau": (1.0, 10.0), "stress": (1.0,), "exponent": (3.0,)}
+        form = Form("load-dependent", ("g", "tau", "stress", "exponent"), grid, nominated=False)
+        return Offer(cls(), (form,), "viscoelasticity")
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer, Sizes
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.parameters import Parameter
 
@@ -27,6 +28,7 @@ class Periodic(Effect):
 
     name: ClassVar[str] = "periodic"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous"})
+    added: ClassVar[bool] = True
     reveals: ClassVar[str] = "a line in the periodogram of the residual"
     blind: ClassVar[str] = "recordings shorter than a period"
     words: ClassVar[tuple[str, ...]] = ("a load with parts of {sin} and {cos} comes back at {frequency}",)
@@ -38,6 +40,16 @@ class Periodic(Effect):
     amplitudes: ClassVar[tuple[str, ...]] = ("sin", "cos", "sin2", "cos2")
     timed: ClassVar[tuple[str, ...]] = amplitudes
     separate: bool = True
+
+    @classmethod
+    def in_material_tests(cls, sizes: Sizes) -> Offer:
+        """See `Effect.in_material_tests`."""
+        both = ("sin", "cos", "sin2", "cos2")
+        forms = (
+            Form("", ("sin", "cos", "frequency"), each=("sin", "cos")),
+            Form("two harmonics", (*both, "frequency"), nominated=False, each=both),
+        )
+        return Offer(cls(separate=True), forms)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect, Respond
+from tissuejax.effects.form import Form, Offer, Sizes
 from tissuejax.effects.history import running_peak
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.parameters import Parameter
@@ -33,6 +34,13 @@ class PermanentSet(Effect):
     needs: ClassVar[str] = "reversed"
     source: ClassVar[str] = "Mullins 1969; Diani, Fayolle and Gilormini 2009"
     amplitudes: ClassVar[tuple[str, ...]] = ("amount",)
+
+    @classmethod
+    def in_material_tests(cls, sizes: Sizes) -> Offer:
+        """See `Effect.in_material_tests`."""
+        grid = {"threshold": (0.0, 0.2 * sizes.strain), "measure": (0.1,)}
+        later = Form("with threshold", ("amount", "threshold", "measure"), grid, nominated=False)
+        return Offer(cls(), (Form("", ("amount",)), later))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

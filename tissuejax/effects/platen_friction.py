@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer, Sizes
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.parameters import Parameter
 
@@ -30,6 +31,12 @@ class PlatenFriction(Effect):
     source: ClassVar[str] = "Siebel 1923; Hill 1950, ch. 10"
     order: ClassVar[int] = 0
     amplitudes: ClassVar[tuple[str, ...]] = ("friction",)
+
+    @classmethod
+    def in_material_tests(cls, sizes: Sizes) -> Offer:
+        """See `Effect.in_material_tests`."""
+        other = Form("another aspect", ("friction", "flattening"), {"flattening": (0.0,)}, nominated=False)
+        return Offer(cls(), (Form("", ("friction",)), other))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

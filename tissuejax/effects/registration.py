@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.recordings.recording import Channel
@@ -24,6 +25,8 @@ class Registration(Effect):
 
     name: ClassVar[str] = "registration"
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    group: ClassVar[str] = "rig"
+    displaces: ClassVar[tuple[str, ...]] = ("dx", "dy")
     remembers: ClassVar[bool] = False
     misjudged: ClassVar[Mapping[str, float]] = {
         "dx": 7e-4,
@@ -43,6 +46,12 @@ class Registration(Effect):
     source: ClassVar[str] = "Lister 2012, 2.2.4 (registration of robot and cameras)"
     amplitudes: ClassVar[tuple[str, ...]] = ("dx", "dy", "radius", "thickness", "turn")
     order: ClassVar[int] = 0
+
+    @classmethod
+    def in_probings(cls, energy: float) -> Offer:
+        """See `Effect.in_probings`."""
+        alone = (Form(name, (name,)) for name in ("turn", "radius", "thickness"))
+        return Offer(cls(), (Form("place", ("dx", "dy")), *alone))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

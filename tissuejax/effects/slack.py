@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect, Respond
+from tissuejax.effects.form import Form, Offer, Sizes
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.parameters import Parameter
 
@@ -36,6 +37,16 @@ class Slack(Effect):
     source: ClassVar[str] = "ASTM D882, toe compensation"
     order: ClassVar[int] = 0
     amplitudes: ClassVar[tuple[str, ...]] = ("gap", "preload")
+
+    @classmethod
+    def in_material_tests(cls, sizes: Sizes) -> Offer:
+        """See `Effect.in_material_tests`."""
+        forms = (
+            Form("", ("gap",)),
+            Form("rounded", ("gap", "roundness"), {"roundness": (0.4, 1.0)}, nominated=False),
+            Form("loaded before", ("preload",)),
+        )
+        return Offer(cls(), forms)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

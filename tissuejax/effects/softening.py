@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer, Sizes
 from tissuejax.effects.history import running_peak
 from tissuejax.effects.material_test import MaterialTest, Stress
 from tissuejax.effects.probing_test import ProbingTest
@@ -35,6 +36,8 @@ class Softening(Effect):
 
     name: ClassVar[str] = "softening"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
+    history: ClassVar[bool] = True
+    group: ClassVar[str] = "history"
     reveals: ClassVar[str] = "unloading below loading at any rate, reloading along the unloading path"
     blind: ClassVar[str] = "monotonic loading"
     words: ClassVar[tuple[str, ...]] = ("{r:%} of the stiffness is lost below the largest past load",)
@@ -43,6 +46,21 @@ class Softening(Effect):
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"m": (0.005, 0.02, 0.08, 0.3)}
     loading: bool = False
     law: str = "erf"
+
+    @classmethod
+    def in_material_tests(cls, sizes: Sizes) -> Offer:
+        """See `Effect.in_material_tests`."""
+        forms = (
+            Form("", ("r", "m"), {"m": tuple(sizes.energy * x for x in (0.02, 0.1, 0.4))}),
+            Form("with growth", ("r", "m", "beta"), nominated=False),
+            Form("with loading", ("r", "d", "m", "beta"), nominated=False),
+        )
+        return Offer(cls(loading=True), forms)
+
+    @classmethod
+    def in_probings(cls, energy: float) -> Offer:
+        """See `Effect.in_probings`."""
+        return Offer(cls(), (Form("", ("r", "m"), {"m": (0.05 * energy, 0.4 * energy)}),))
 
     def __check_init__(self):
         if self.law not in LAWS:

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.tled.scene import Scene
@@ -25,6 +26,8 @@ class SupportMotion(Effect):
 
     name: ClassVar[str] = "support-motion"
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
+    group: ClassVar[str] = "rig"
+    displaces: ClassVar[tuple[str, ...]] = ("sin", "cos", "sin2", "cos2", "lean_x", "lean_y", "frequency")
     reveals: ClassVar[str] = "a line in the periodogram of markers and force, also out of contact"
     blind: ClassVar[str] = "recordings shorter than a period"
     words: ClassVar[tuple[str, ...]] = (
@@ -35,6 +38,12 @@ class SupportMotion(Effect):
     remembers: ClassVar[bool] = False
     amplitudes: ClassVar[tuple[str, ...]] = ("sin", "cos", "sin2", "cos2")
     separate: bool = True
+
+    @classmethod
+    def in_probings(cls, energy: float) -> Offer:
+        """See `Effect.in_probings`."""
+        waves = cls.amplitudes
+        return Offer(cls(), (Form("", (*waves, "lean_x", "lean_y", "frequency"), each=waves),))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from tissuejax.effects.cutting_test import Cut
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Form, Offer, Sizes
 from tissuejax.effects.history import fading
 from tissuejax.effects.material_test import MaterialTest, Stress
 from tissuejax.effects.probing_test import ProbingTest
@@ -40,6 +41,8 @@ class Viscoelasticity(Effect):
 
     name: ClassVar[str] = "viscoelasticity"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing", "cutting"})
+    history: ClassVar[bool] = True
+    group: ClassVar[str] = "history"
     reveals: ClassVar[str] = "relaxation during holds, hysteresis, stiffness that rises with rate"
     blind: ClassVar[str] = "a single ramp at constant rate; cuts with a blade that hardly rubs"
     words: ClassVar[tuple[str, ...]] = (
@@ -56,6 +59,37 @@ class Viscoelasticity(Effect):
     shortest: float = 0.1
     longest: float = 100.0
     moduli: bool = False
+
+    @classmethod
+    def in_material_tests(cls, sizes: Sizes) -> Offer:
+        """See `Effect.in_material_tests`."""
+        last, two = sizes.recording, ("g1", "g2", "tau1", "tau2")
+        three = ("g1", "g2", "g3", "tau1", "tau2", "tau3")
+        once = {"tau1": tuple(last * float(t) for t in np.geomspace(0.0025, 1.5, 7))}  # what the longest one can show
+        pairs = {
+            "tau1": tuple(last * t for t in (0.005, 0.015, 0.05)),
+            "tau2": tuple(last * t for t in (0.1, 0.3, 1.0)),
+        }
+        third = {"tau3": (0.025 * last, 1.5 * last, 0.0025 * last)}  # between the two that are there, slower, faster
+        moduli, nominal = {"moduli": (1.0,)}, {"nominal": (1.0,)}
+        forms = (
+            Form("one time", ("g1", "tau1"), once),
+            Form("two times", two, pairs),
+            Form("two times of the moduli", (*two, "moduli"), pairs | moduli),
+            Form("three times", three, third, nominated=False),
+            Form("three times of the moduli", (*three, "moduli"), third | moduli, nominated=False),
+            Form("two times of the nominal stress", (*two, "nominal"), pairs | nominal),
+            Form("three times of the nominal stress", (*three, "nominal"), third | nominal, nominated=False),
+        )
+        return Offer(cls(terms=3), forms)
+
+    @classmethod
+    def in_probings(cls, energy: float) -> Offer:
+        """See `Effect.in_probings`."""
+        one = Form("one time", ("g1", "tau1"), {"tau1": (0.4, 4.0)}, nominated=False)
+        return Offer(
+            cls(terms=2), (one, Form("two times", ("g1", "g2", "tau1", "tau2"), {"tau1": (0.5,), "tau2": (6.0,)}))
+        )
 
     @property
     def amplitudes(self) -> tuple[str, ...]:

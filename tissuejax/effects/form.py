@@ -1,0 +1,88 @@
+"""What an effect offers a diagnosis: the forms in which it is tried.
+
+Most effects are one candidate. Some come in forms, from simple to full (one relaxation time, two, three; one offset for
+all recordings or one each), all under one name: a simple form is nominated, and where it stands it is tried with its
+richer and its poorer neighbour, so that a law that differs from ours bends the effect's own form before another
+effect is called to help.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tissuejax.effects.effect import Effect
+
+
+@dataclass(frozen=True)
+class Form:
+    """Which parameters of an effect are free in one form of it.
+
+    Attributes:
+        name: of the form; "" for the only one.
+        free: parameter names, amplitudes and shapes.
+        grid: shapes to scan.
+        nominated: False for forms that are only reached from a neighbour.
+        each: parameters with a value of their own in every recording.
+        reach: how many times beyond the values scanned (or the default) a positive shape may go.
+        most: limits of exponents, which run away where the fitted recordings hardly reach them.
+        beside: names of forms that it is tried beside, whatever the order.
+    """
+
+    name: str
+    free: tuple[str, ...]
+    grid: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    nominated: bool = True
+    each: tuple[str, ...] = ()
+    reach: float = 10.0
+    most: Mapping[str, float] = field(default_factory=dict)
+    beside: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """What a sample's recordings are like, so that shapes are scanned where they can be seen.
+
+    Attributes:
+        energy: typical strain energy, Pa: damage scales are scanned around it.
+        strain: largest |ln stretch|: exponents of exponential terms bend within it.
+        force: largest force, N: a rig stiffens within it.
+        session: time from the first recording to the last, s: drifts die out within it.
+        recording: duration of one, s.
+    """
+
+    energy: float
+    strain: float
+    force: float
+    session: float
+    recording: float
+
+    @property
+    def stretched(self) -> float:
+        """The largest squared stretch less 1."""
+        return math.expm1(2 * self.strain)
+
+
+@dataclass(frozen=True)
+class Offer:
+    """An effect as a diagnosis tries it.
+
+    Attributes:
+        effect: with all that any of its forms needs.
+        forms: simple to full.
+        title: the name under which it is reported; its own by default.
+        simple: the effect without what makes every prediction a search, for sets that don't use that.
+    """
+
+    effect: "Effect"
+    forms: tuple[Form, ...]
+    title: str = ""
+    simple: "Effect | None" = None
+
+    @classmethod
+    def whole(cls, effect: "Effect") -> "Offer":
+        """In one form: all its parameters and the shapes of its grid."""
+        free = tuple(p.name for p in effect.parameters if not p.frozen)
+        each = tuple(p.name for p in effect.parameters if p.each)
+        return cls(effect, (Form("", free, dict(effect.grid), each=each),))
