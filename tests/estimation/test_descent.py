@@ -1,0 +1,149 @@
+"""One descent, three choices of its parts: each reaches the least-squares solution that scipy finds, in its own way."""
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from tissuejax.errors import UnstableSimulation
+from tissuejax.estimation.descent import descend
+from tissuejax.estimation.ending import Ending
+from tissuejax.estimation.methods import corrected, exact, sparing
+from tissuejax.estimation.posed import LeastSquares, half_square
+from tissuejax.estimation.reach import Reach, bounded
+
+T = np.linspace(0, 3, 120)
+DATA = 2.0 * np.exp(-1.3 * T) + 0.01 * np.random.default_rng(3).normal(size=T.size)
+START = np.log([4.0, 0.5])
+
+
+class Decay(LeastSquares):
+    """a exp(-b t) against noisy data, in logarithms of a and b; counts what is asked."""
+
+    def __init__(self):
+        self.asked = {"residuals": 0, "jacobian": 0}
+
+    def residuals(self, y):
+        self.asked["residuals"] += 1
+        a, b = np.exp(y)
+        return (a * np.exp(-b * T) - DATA) / 0.01
+
+    def jacobian(self, y):
+        self.asked["jacobian"] += 1
+        a, b = np.exp(y)
+        one = a * np.exp(-b * T) / 0.01
+        return np.stack([one, -b * T * one], 1)
+
+
+def boxed(low, high, **options):
+    reach = Reach(np.array(low, float), np.array(high, float), np.ones(2))
+    return corrected(reach, 40, 1e-6, **options)
+
+
+@pytest.mark.parametrize(
+    ("method", "error"), [(exact(2), 1e-3), (sparing(2, fraction=1e-3), 1e-2), (boxed([-9, -9], [9, 9]), 1e-2)]
+)
+def test_every_method_reaches_the_solution_of_scipy(method, error):
+    problem = Decay()
+    found = descend(problem, START, method)
+    answer = least_squares(Decay().residuals, START, Decay().jacobian, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    J = Decay().jacobian(answer.x)
+    std = np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
+    assert found.ending is Ending.CONVERGED
+    assert (np.abs(found.y - answer.x) < error * std).all()
+    assert found.cost == pytest.approx(answer.cost, rel=1e-4)
+    assert (found.runs, found.jacobians) == (problem.asked["residuals"], problem.asked["jacobian"])
+    assert [c for c, _ in found.trace] == sorted((c for c, _ in found.trace), reverse=True)
+
+
+def test_a_corrected_jacobian_is_computed_less_often():
+    few, many = descend(Decay(), START, boxed([-9, -9], [9, 9])), descend(Decay(), START, exact(2))
+    assert few.jacobians < many.jacobians
+
+
+def test_what_rests_on_a_bound_solves_the_bounded_problem():
+    low, high = [-9.0, -9.0], [9.0, np.log(1.1)]
+    found = descend(Decay(), START, boxed(low, high))
+    answer = least_squares(Decay().residuals, START, Decay().jacobian, bounds=(low, high), xtol=1e-14, ftol=1e-14)
+    assert found.y[1] == high[1]
+    assert found.y[0] == pytest.approx(answer.x[0], abs=1e-4)
+
+
+def test_a_jacobian_from_elsewhere_is_good_for_one_step_only():
+    wrong = np.zeros((T.size, 2))
+    wrong[:, 0] = 1.0
+    found = descend(Decay(), START, boxed([-9, -9], [9, 9], known=wrong))
+    right = descend(Decay(), START, exact(2))
+    assert found.cost == pytest.approx(right.cost, rel=1e-4)
+
+
+class Cliff(Decay):
+    """The same, but nothing can be predicted beyond b = 1.6: `how` says in which way."""
+
+    def __init__(self, how):
+        super().__init__()
+        self.how = how
+
+    def residuals(self, y):
+        if y[1] > np.log(1.6):
+            if self.how == "raises":
+                raise UnstableSimulation("blew up")
+            return np.full(T.size, np.nan)
+        return super().residuals(y)
+
+
+@pytest.mark.parametrize("how", ["raises", "nan"])
+@pytest.mark.parametrize("method", [exact(2), sparing(2), boxed([-9, -9], [9, 9])])
+def test_where_nothing_can_be_predicted_no_step_is_taken(method, how):
+    found = descend(Cliff(how), np.log([4.0, 0.2]), method)
+    assert found.converged
+    assert np.exp(found.y[1]) == pytest.approx(1.3, abs=0.05)
+
+
+def test_endings_are_sentences():
+    assert (
+        descend(Cliff("nan"), np.log([4.0, 2.0]), exact(2)).reason == "the model has no finite prediction at the start"
+    )
+    cut = descend(Decay(), START, exact(2, runs=3))
+    assert cut.ending is Ending.SPENT
+    assert cut.reason == "no convergence after 3 evaluations"
+    assert not cut.converged
+
+    class Steep(Decay):
+        def jacobian(self, y):
+            return np.full((T.size, 2), np.inf)
+
+    assert descend(Steep(), START, sparing(2)).ending is Ending.NO_DERIVATIVE
+
+
+def test_a_start_that_creeps_behind_another_is_given_up():
+    """Along a curved valley a thousand times as steep as it is long every step gains little."""
+
+    class Valley(LeastSquares):
+        def residuals(self, y):
+            return np.array([1 - y[0], 1e3 * (y[1] - y[0] ** 2)])
+
+        def jacobian(self, y):
+            return np.array([[-1.0, 0.0], [-2e3 * y[0], 1e3]])
+
+    start = np.array([-6.0, 36.0])
+    alone = descend(Valley(), start, exact(2, runs=4000))
+    behind = descend(Valley(), start, exact(2, runs=4000, to_beat=1e-3))
+    assert alone.converged
+    assert alone.y == pytest.approx([1, 1], abs=1e-6)
+    assert behind.ending is Ending.BEHIND
+    assert behind.runs < 0.5 * alone.runs
+
+
+def test_bounded_steps_are_those_of_scipy(rng):
+    from scipy.optimize import lsq_linear
+
+    a, b = rng.normal(size=(30, 4)), rng.normal(size=30)
+    for low, high in ((-np.inf, np.inf), (-0.05, 0.05), (0.0, 0.02)):
+        step = bounded(a, b, np.full(4, low), np.full(4, high))
+        assert step == pytest.approx(lsq_linear(a, b, (low, high), tol=1e-14).x, abs=1e-7)
+
+
+def test_half_the_squares_of_what_is_not_finite_are_infinite():
+    assert half_square(np.array([3.0, 4.0])) == 12.5
+    assert half_square(np.array([1.0, np.nan])) == np.inf
+    assert half_square(np.array([1e200, 1.0])) == np.inf
