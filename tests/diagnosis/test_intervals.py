@@ -41,7 +41,7 @@ def covered(stated, estimated):
     for _ in range(DRAWS):
         bench = measured(rng, stated(rng), estimated)
         fit = refit(bench, white(bench), (), TRUTH, tolerance=1e-9)
-        ends = fit.intervals(bench)
+        ends = fit.intervals
         held.append([low < TRUTH[p] < high for p, (low, high) in ends.items()])
         miss.append([fit.values[p] - TRUTH[p] for p in TRUTH])
         variance.append([fit.std[p] ** 2 for p in TRUTH])

@@ -164,7 +164,7 @@ class MaterialBench(Bench):
         heavy = self._searched | self._remembering
         self._heavy = {f"effects.{e.effect.name}.": e.effect.name for e in found if e.effect.name in heavy}
         whole = Model(energy, None, tuple(e.effect for e in found)).across(recordings)
-        self._full = {
+        self._needs_full = {
             f"effects.{e.effect.name}.{p.name}": e.effect.name
             for e in found
             if e.simple is not None

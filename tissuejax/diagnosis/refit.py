@@ -7,24 +7,24 @@ recording alone (an offset, a phase) is fitted on the held-out recordings too, a
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
 
-from tissuejax.diagnosis.bench import Bench
+from tissuejax.diagnosis.bench import Bench, Free
 from tissuejax.diagnosis.misfit import Misfit
 from tissuejax.estimation.covariance import inflation, standard_errors
 from tissuejax.estimation.descent import Ended, descend
 from tissuejax.estimation.methods import corrected
 from tissuejax.estimation.posed import LeastSquares
-from tissuejax.estimation.quantile import quantile
 from tissuejax.estimation.reach import Reach
+from tissuejax.estimation.solution import Limits, Solution
 
 
 @dataclass(frozen=True)
-class Refit:
-    """A fit of a set of candidates.
+class Refit(Solution):
+    """A fit of the base with a set of candidates: one of the fits that a diagnosis is made of.
 
     Attributes:
         keys: candidates in the set, in the order in which they were added.
@@ -35,6 +35,7 @@ class Refit:
         chi2: whitened chi-square of the fitted recordings (without priors), n its number of samples.
         held: whitened chi-square of the held-out recordings, n_held its number of samples.
         prediction: the long vector.
+        free: how each path may move.
     """
 
     keys: tuple[str, ...]
@@ -49,6 +50,7 @@ class Refit:
     converged: bool
     prediction: Float[np.ndarray, " N"]
     dof: float = math.inf
+    free: Mapping[str, Free] = field(default_factory=dict)
 
     @property
     def k(self) -> int:
@@ -60,24 +62,19 @@ class Refit:
         """Values of all recordings."""
         return {**self.values, **self.own}
 
-    def intervals(self, bench: Bench, confidence: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Value -+ Student's quantile times standard error, cut at the bounds; of paths that are identified.
+    @property
+    def freedom(self) -> float:
+        """See `Solution.freedom`."""
+        return self.dof
 
-        Of paths that move in logarithm the interval is the logarithm's: it never reaches zero.
-        """
-        q, found = quantile(confidence, self.dof), {}
-        for path, std in self.std.items():
-            free, value = bench.free[path], self.all[path]
-            if not np.isfinite(std):
-                continue
-            if free.log:
-                with np.errstate(over="ignore"):
-                    reach = float(np.exp(q * std / value))
-                low, high = value / reach, value * reach
-            else:
-                low, high = value - q * std, value + q * std
-            found[path] = max(low, free.lower), min(high, free.upper)
-        return found
+    def estimate(self, path: str) -> float:
+        """See `Solution.estimate`; those of held-out recordings too."""
+        return self.all[path]
+
+    def limits(self, path: str) -> Limits:
+        """See `Solution.limits`."""
+        free = self.free[path]
+        return Limits(free.lower, free.upper, free.log)
 
 
 class Descent(LeastSquares):
@@ -215,5 +212,17 @@ def refit(
         held = misfit.residual(prediction, bench.held_out)
     outside = float(held @ held) if np.all(np.isfinite(held)) else np.inf
     return Refit(
-        tuple(keys), values, own, std, at_bound, chi2, len(r), outside, len(held), ended.converged, prediction, dof
+        keys=tuple(keys),
+        values=values,
+        own=own,
+        std=std,
+        at_bound=at_bound,
+        chi2=chi2,
+        n=len(r),
+        held=outside,
+        n_held=len(held),
+        converged=ended.converged,
+        prediction=prediction,
+        dof=dof,
+        free=bench.free,
     )

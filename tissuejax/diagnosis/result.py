@@ -174,7 +174,7 @@ class Diagnosis:
     def effects(self, r: Refit) -> list[dict]:
         """Effects of a fit in the order in which they were added, with parameters, standard errors and units."""
         out, free = [], self.answered.bench.free
-        intervals = r.intervals(self.answered.bench)
+        intervals = r.intervals
         for key in r.keys:
             c = self.answered.bench.candidates[key]
             parameters = {
@@ -214,7 +214,7 @@ class Diagnosis:
     def base(self) -> dict:
         """Base parameters before and after."""
         bench, before, after = self.answered.bench, self.answered.empty, self.answered.chosen
-        around = after.intervals(bench)
+        around = after.intervals
         return {
             p: {
                 "before": before.values[p],

@@ -14,6 +14,7 @@ from tissuejax.energies.catalogue import forms_of, name_of
 from tissuejax.energies.stability import Stability
 from tissuejax.estimation.covariance import Uncertainty
 from tissuejax.estimation.problem import Problem
+from tissuejax.estimation.solution import Limits, Solution
 from tissuejax.fitting.fingerprint import fingerprint
 from tissuejax.fitting.first import First
 from tissuejax.fitting.scores import Score
@@ -35,7 +36,7 @@ class Iterate:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class Fit(Solution):
     """The outcome of `fit`.
 
     Attributes:
@@ -98,15 +99,13 @@ class Fit:
         return dict(zip(self.free, map(float, self.uncertainty.std), strict=True))
 
     @property
-    def intervals(self) -> dict[str, tuple[float, float]]:
-        """95 % intervals by path, from standard errors and Student's quantile, cut at the declared bounds."""
-        half = self.uncertainty.quantile()
-        found = {}
-        for path, std in self.std.items():
-            lower, upper = self.problem.bound(path)
-            value = self.values[path]
-            found[path] = max(value - half * std, lower), min(value + half * std, upper)
-        return found
+    def freedom(self) -> float:
+        """See `Solution.freedom`."""
+        return self.uncertainty.dof
+
+    def limits(self, path: str) -> Limits:
+        """See `Solution.limits`: the bounds of the fit."""
+        return Limits(*self.problem.bound(path))
 
     @property
     def shear_moduli(self) -> dict[str, float]:
