@@ -109,6 +109,30 @@ def test_the_front_door_offers_verbs_nouns_and_a_version():
         tissuejax.Sampel  # noqa: B018
 
 
+def constants(path: Path) -> set[str]:
+    """Public constants that a file defines: names in capitals at its top level."""
+    targets = []
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.Assign):
+            targets += node.targets
+        elif isinstance(node, ast.AnnAssign):
+            targets.append(node.target)
+    names = {n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    return {n for n in names if n.isupper() and not n.startswith("_")}
+
+
+@pytest.mark.parametrize("name", sorted({room(p) for p in FILES} - {"challenge"}))
+def test_a_constant_has_one_home_in_its_room(name):
+    """Else one name has two meanings. The challenge is left out: a maker of cases a file, alike by design."""
+    homes: dict[str, list[str]] = {}
+    for path in FILES:
+        if room(path) == name:
+            for constant in constants(path):
+                homes.setdefault(constant, []).append(str(path.relative_to(ROOT)))
+    twice = {c: files for c, files in homes.items() if len(files) > 1}
+    assert not twice
+
+
 def test_no_vague_names():
     vague = {"utils", "helpers", "base", "misc", "common"}
     assert not [p for p in FILES if p.stem in vague]

@@ -7,7 +7,7 @@ from tissuejax.cards.card import Card, number, row, rows
 from tissuejax.cards.material import POWERS, Material
 from tissuejax.errors import InputError
 
-MOST = 6  # terms of an Ogden or polynomial energy
+ABAQUS_MAX = 6  # terms of an Ogden or polynomial energy
 
 
 class Abaqus(Card):
@@ -28,7 +28,7 @@ class Abaqus(Card):
         body = [f"*MATERIAL, NAME={subject.name}"]
         if subject.density is not None:
             body += ["*DENSITY", number(subject.density)]
-        return body + hyperelastic(self, subject, MOST, MOST, moduli=bool(subject.prony)) + _prony(subject)
+        return body + hyperelastic(self, subject, ABAQUS_MAX, ABAQUS_MAX, moduli=bool(subject.prony)) + _prony(subject)
 
 
 def hyperelastic(

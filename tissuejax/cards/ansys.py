@@ -6,8 +6,8 @@ from tissuejax.cards.card import Card, number
 from tissuejax.cards.material import POWERS, Material
 from tissuejax.errors import InputError
 
-MOST = 5  # terms taken here of a polynomial or Yeoh energy
-MOST_OGDEN = 6
+ANSYS_MAX = 5  # terms taken here of a polynomial or Yeoh energy
+ANSYS_OGDEN = 6
 
 
 class Ansys(Card):
@@ -28,7 +28,7 @@ class Ansys(Card):
         body = [] if subject.density is None else [f"MP,DENS,1,{number(subject.density)}"]
         kind, c, terms = subject.energy.name, subject.constants, subject.polynomial()
         order = getattr(subject.energy, "order", 1)
-        limit = MOST_OGDEN if kind == "ogden" else MOST
+        limit = ANSYS_OGDEN if kind == "ogden" else ANSYS_MAX
         if order > limit:
             raise InputError(f"this card takes {kind} up to order {limit}, this one has {order}; fit fewer terms")
         if kind == "neo-hookean":

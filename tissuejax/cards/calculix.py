@@ -8,7 +8,7 @@ from tissuejax.cards.card import Card, number
 from tissuejax.cards.material import POWERS, Material
 from tissuejax.energies.catalogue import volumetric
 
-MOST_OGDEN, MOST = 4, 3
+CALCULIX_OGDEN, CALCULIX_MAX = 4, 3
 UNUSED = 1e20  # a D_i of 0 is not left out there but replaced by a default: stress 0.8 % off in one element
 
 
@@ -32,4 +32,4 @@ class Calculix(Card):
         body = [*head, f"*MATERIAL, NAME={subject.name}"]
         if subject.density is not None:
             body += ["*DENSITY", number(subject.density)]
-        return body + hyperelastic(self, subject, MOST_OGDEN, MOST, unused=UNUSED)
+        return body + hyperelastic(self, subject, CALCULIX_OGDEN, CALCULIX_MAX, unused=UNUSED)

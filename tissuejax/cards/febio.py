@@ -7,7 +7,7 @@ from tissuejax.cards.card import Card, number
 from tissuejax.cards.material import LOGARITHM, Material
 from tissuejax.errors import InputError
 
-MOST = 6  # terms
+FEBIO_MAX = 6  # terms
 
 
 class Febio(Card):
@@ -25,8 +25,10 @@ class Febio(Card):
 
     def lines(self, subject: Material) -> list[str]:
         """One <material>."""
-        if len(subject.prony) > MOST:
-            raise InputError(f"febio takes {MOST} relaxation times, this material has {len(subject.prony)}; fit fewer")
+        if len(subject.prony) > FEBIO_MAX:
+            raise InputError(
+                f"febio takes {FEBIO_MAX} relaxation times, this material has {len(subject.prony)}; fit fewer"
+            )
         kind, constants = self._elastic(subject)
         K, why = subject.penalty()
         inner = [f"<{tag}>{number(value)}</{tag}>" for tag, value in [*constants, ("k", K)]]
@@ -51,8 +53,8 @@ class Febio(Card):
     def _elastic(self, subject: Material) -> tuple[str, list[tuple[str, float]]]:
         kind, c, terms = subject.energy.name, subject.constants, subject.polynomial()
         order = getattr(subject.energy, "order", 1)
-        if order > MOST:
-            raise InputError(f"febio takes {kind} up to order {MOST}, this one has {order}; fit fewer terms")
+        if order > FEBIO_MAX:
+            raise InputError(f"febio takes {kind} up to order {FEBIO_MAX}, this one has {order}; fit fewer terms")
         if kind in ("neo-hookean", "mooney-rivlin") or (kind == "polynomial" and order == 1):
             return "Mooney-Rivlin", [("c1", terms[1, 0]), ("c2", terms.get((0, 1), 0.0))]
         if kind == "reduced-polynomial":

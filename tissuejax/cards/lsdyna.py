@@ -11,7 +11,7 @@ from tissuejax.cards.material import Material
 from tissuejax.errors import InputError
 
 SLOTS = ((1, 0), (0, 1), (1, 1), (2, 0), (0, 2), (3, 0))
-MOST = 8
+LSDYNA_MAX = 8
 
 
 class Lsdyna(Card):
@@ -48,9 +48,9 @@ class Lsdyna(Card):
             ]
         if subject.energy.name == "ogden":
             pairs = subject.ogden(self.ogden)
-            if len(pairs) > MOST:
-                raise InputError(f"ls-dyna takes {MOST} Ogden terms, this one has {len(pairs)}; fit fewer")
-            pairs += [(0.0, 0.0)] * (MOST - len(pairs))
+            if len(pairs) > LSDYNA_MAX:
+                raise InputError(f"ls-dyna takes {LSDYNA_MAX} Ogden terms, this one has {len(pairs)}; fit fewer")
+            pairs += [(0.0, 0.0)] * (LSDYNA_MAX - len(pairs))
             return [
                 *head,
                 "*MAT_OGDEN_RUBBER_TITLE",

@@ -124,9 +124,6 @@ def held_in(f: Free, most: float) -> Free:
     return replace(f, upper=most, lower=min(f.lower, 1e-3 * most), prior=(math.log(most / 10), SPREAD), limited=True)
 
 
-SPREAD = math.log(5.0)
-
-
 def entries(sizes: Sizes) -> list[Entry]:
     """All effects that act in material tests, in their forms."""
     return [Entry.of(kind.in_material_tests(sizes)) for kind in effects("homogeneous").values()]

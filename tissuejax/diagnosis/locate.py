@@ -15,7 +15,7 @@ from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.periodogram import periodogram
 from tissuejax.estimation.series import Segment
 
-CYCLES = 2.0  # fewer periods in a recording are no period: any single press looks like one
+CYCLES_SHOWN = 2.0  # fewer periods in a recording are no period: any single press looks like one
 PHASES = ("rest", "loading", "hold", "unloading")
 
 
@@ -192,7 +192,7 @@ def _period(segments: list[Segment], z: np.ndarray) -> Iterable[Located]:
     best = int(np.argmax(power))
     share = float((power[best] - 2 * len(segments)) / (whole - n))
     cycles = frequencies[best] * max(s.time[-1] - s.time[0] for s in segments)
-    if share > 0.5 and cycles >= CYCLES:
+    if share > 0.5 and cycles >= CYCLES_SHOWN:
         period = 1 / frequencies[best]
         what = f"a period of {period:.3g} s ({frequencies[best]:.3g} Hz)"
         details = {"period": float(period), "frequency": float(frequencies[best]), "unit": "s"}

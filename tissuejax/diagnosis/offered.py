@@ -24,7 +24,7 @@ STILL = 0.05  # of the quickest rate: slower is a hold
 RATES = 1.5  # ratio from which two rates are two
 NEAR = 0.05  # of the largest strain: strains closer than this are one
 SHARED = 0.5  # of a recording's samples
-POINTS = 200  # of a recording's path that are compared
+FIBRE_POINTS = 200  # of a recording's path that are compared
 HELD = 0.05  # of a recording's time: a shorter hold is none
 
 
@@ -103,7 +103,7 @@ def alike(a: Recording, b: Recording) -> bool:
 def overlap(a: Recording, b: Recording) -> float:
     """Share of the samples of `a`, those near rest left out, whose strain `b` passes too."""
     one, other = (np.stack([x for _, x in driven(r)], axis=1) for r in (a, b))
-    one, other = (x[np.unique(np.linspace(0, len(x) - 1, POINTS).astype(int))] for x in (one, other))
+    one, other = (x[np.unique(np.linspace(0, len(x) - 1, FIBRE_POINTS).astype(int))] for x in (one, other))
     near = NEAR * float(np.max(np.abs(np.concatenate([one, other]))))
     one = one[np.linalg.norm(one, axis=1) > near]
     apart = np.min(np.linalg.norm(one[:, None] - other[None], axis=-1), axis=1) if len(one) else np.zeros(0)

@@ -42,7 +42,7 @@ from tissuejax.recordings.recording import Sample
 # Elements of the mesh that counts. 16 x 16 x 6 are 2 to 5 % too stiff in p02, most where a press is shallow, and were
 # named as a tissue 4 % thinner; with these the true constants leave 1.07 in chi-square of the force and not 1.72.
 MESH = (22, 22, 8)
-STEP, LOG_STEP = 0.15, 0.04  # of a parameter's scale; of its logarithm
+STEP_OF_SCALE, LOG_STEP = 0.15, 0.04  # of a parameter's scale; of its logarithm
 AGED = 0.5  # standard deviation of the logarithm of stiffness at the end of a session
 COLUMN = 0.5  # step of a score's column, of the amplitude's scale
 
@@ -208,7 +208,7 @@ class ProbingBench(Bench):
     def _step(self, path: str, value: float) -> float:
         f = self.free[path]
         size = abs(value) if path in self.base else 0.3 * abs(value)
-        h = LOG_STEP * abs(value) if f.log else STEP * max(f.scale, size)
+        h = LOG_STEP * abs(value) if f.log else STEP_OF_SCALE * max(f.scale, size)
         return -h if value + h > f.upper else h
 
     def _near(self, setting: Mapping[str, float]) -> tuple[str, ...]:

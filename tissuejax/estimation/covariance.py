@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 from tissuejax.estimation.quantile import quantile
 
-UNSEEN = 1.0  # a combination whose relative standard error exceeds this is called not identified
+NOT_IDENTIFIED = 1.0  # a combination whose relative standard error exceeds this is called not identified
 SHARE = 0.3  # a parameter takes part in a combination from this share of its largest member on
 
 
@@ -154,7 +154,7 @@ def uncertainty(
     sentences = tuple(
         unseen(v, size, labels, units, widening / max(value, floor))
         for value, v in zip(s, vt, strict=True)
-        if widening / max(value, floor) > UNSEEN
+        if widening / max(value, floor) > NOT_IDENTIFIED
     )
     return Uncertainty(
         std,

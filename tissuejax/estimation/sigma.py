@@ -5,7 +5,7 @@ import numpy as np
 from tissuejax.estimation.level import Level, Response, levels
 from tissuejax.recordings.recording import Sample
 
-LEAST = 1e-3  # of the root mean square of a series: below this nothing is believed of a noise that was not recorded
+QUIETEST = 1e-3  # of the root mean square of a series: below this nothing is believed of a noise that was not recorded
 
 
 def sigmas(
@@ -34,7 +34,7 @@ def sigmas(
     sizes = {name: float(np.sqrt(np.nanmean(np.asarray(c.values, float) ** 2))) or 1.0 for name, c in unknown.items()}
     parts = {name: [x for x, owner in zip(found, owners) if owner == name] for name in unknown}
     for name, own in parts.items():
-        out[name] = max(float(np.sqrt(np.mean([x.std**2 for x in own]))), LEAST * sizes[name])
+        out[name] = max(float(np.sqrt(np.mean([x.std**2 for x in own]))), QUIETEST * sizes[name])
     unit = next(iter(unknown.values())).unit
     said = ", ".join(f"{name} {out[name]:.3g} {unit}" for name in unknown)
     remarks = [f"noise was not recorded and is estimated from the recordings themselves: {said}"]

@@ -23,7 +23,7 @@ from tissuejax.recordings.recording import Channel, Recording, Sample
 from tissuejax.tled.simulate import COMPILER_OPTIONS
 
 WAYS = ("balance", "simulation")
-DENSITY = 1000.0
+CUT_DENSITY = 1000.0
 
 
 class CuttingPredictor(Predictor):
@@ -89,7 +89,7 @@ class CuttingPredictor(Predictor):
         at, slices = self.model.defaults | dict(start or {}), {}
         for n in self.names:
             values = local(self.model, at, n)
-            density = self.sample.density or DENSITY
+            density = self.sample.density or CUT_DENSITY
             slices[n] = prepare(self.model.across(()), values, density, self.paths_of[n], self.settings)
         return replace(self, slices=slices)
 

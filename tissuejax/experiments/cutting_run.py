@@ -30,8 +30,8 @@ from tissuejax.tled.scene import Scene
 from tissuejax.tled.simulate import simulate
 
 SPEED = 0.05  # m/s
-FEWEST = 8
-CALM = 0.25  # friction excites that mode, the more the longer the blade is in contact; at 0.04 it grows
+FEW = 8
+CALM_CUT = 0.25  # friction excites that mode, the more the longer the blade is in contact; at 0.04 it grows
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,12 @@ class CuttingSettings:
     """Numerical choices of a simulated cut.
 
     Attributes:
-        h: size of the elements along the path, m; None: the half thickness of the blade, and at least `FEWEST` along
+        h: size of the elements along the path, m; None: the half thickness of the blade, and at least `FEW` along
             it.
         growth: of elements away from the path, from one to the next.
         reach: of the path that is simulated, m; the whole by default.
         rounding: radius of the shoulder, m; None: what elements of this size can feel (`seam.shoulder`).
-        damping: mass damping, 1/s; None: `CALM` of the lowest shear frequency of a half, pi/2 c_s / W.
+        damping: mass damping, 1/s; None: `CALM_CUT` of the lowest shear frequency of a half, pi/2 c_s / W.
         strongest: strength that the faces' stiffness must allow, over the start's.
     """
 
@@ -87,7 +87,7 @@ class Ran(eqx.Module):
 
 def element_size(settings: CuttingSettings, path: Path) -> float:
     """Size of the elements along the path, m."""
-    return settings.h or min(0.5 * path.thickness, path.length / FEWEST)
+    return settings.h or min(0.5 * path.thickness, path.length / FEW)
 
 
 def prepare(model: Model, values: Mapping[str, float], density: float, path: Path, settings: CuttingSettings) -> Slice:
@@ -115,7 +115,7 @@ def prepare(model: Model, values: Mapping[str, float], density: float, path: Pat
     damping = settings.damping
     if damping is None:
         shear = float(model.energy.initial_shear_modulus(under("energy", values)))
-        damping = CALM * 0.5 * np.pi * np.sqrt(shear / density) / path.half
+        damping = CALM_CUT * 0.5 * np.pi * np.sqrt(shear / density) / path.half
     scene = build.scene(
         made.geometry,
         build.Tissue(model.energy, model.volumetric, under("energy", values), under("volumetric", values), density),

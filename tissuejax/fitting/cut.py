@@ -38,13 +38,13 @@ from tissuejax.parameters import checked, under
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 COARSER = 1.5
-ROUNDS = 12
-NEAR, FAR = 1e-3, 1e-2  # relative decrease of the misfit at which a descent ends: the last, the others
+SLICES = 12
+SETTLED, FAR = 1e-3, 1e-2  # relative decrease of the misfit at which a descent ends: the last, the others
 SAME = 1.3  # a slice made for a strength serves up to this ratio
 # How far strength and energy may go from where a slice was made, in its first round and in later ones: toughness and
 # friction first, which mean and slope of the force tell from anywhere, and strength about them. All at once from half
 # the values, a descent went to a brittle tissue (strength at its bound, a twentieth of the toughness) and stayed there
-FIRST, LATER = {STRENGTH: 1.25, ENERGY: 3.0}, {STRENGTH: 2.0, ENERGY: 2.0}
+FIRST_STARTS, LATER = {STRENGTH: 1.25, ENERGY: 3.0}, {STRENGTH: 2.0, ENERGY: 2.0}
 
 
 def blocked(sample: Sample, paths: Mapping[str, Path], sizes: Mapping[str, float]) -> tuple[Sample, dict[str, Blocks]]:
@@ -170,9 +170,9 @@ def _rounds(made, free, values, max_steps) -> tuple[Problem, Ended, bool, int]:
     made anew gets it off them, so few evaluations are spent on each).
     """
     runs = 0
-    for n in range(ROUNDS):
-        posed = _posed(made, free, values, LATER if n else FIRST)
-        ended = descend(posed, values, max_steps=max_steps, tolerance=NEAR if n else FAR)
+    for n in range(SLICES):
+        posed = _posed(made, free, values, LATER if n else FIRST_STARTS)
+        ended = descend(posed, values, max_steps=max_steps, tolerance=SETTLED if n else FAR)
         runs += ended.runs
         if not np.isfinite(ended.cost):  # the entry folds: weaker tissue does not
             values = values | {STRENGTH: values[STRENGTH] / 2}

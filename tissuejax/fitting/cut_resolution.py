@@ -13,7 +13,7 @@ from tissuejax.errors import InputError
 
 SPAN = 3  # elements that the cohesive length should span
 NANOSECONDS = 200.0  # an element and step, one core, double precision
-LEAST = 0.01  # J/m^2: no tissue has so little
+LEAST_SHARE = 0.01  # J/m^2: no tissue has so little
 TOUGH = (1.0, 2000.0)  # J/m^2: soft tissue that was ever cut lies between
 
 
@@ -97,7 +97,7 @@ def plane_modulus(mu: float, bulk: float) -> float:
 
 def refuse_joules(energy: float) -> None:
     """Raise on an energy per area that can only be an energy."""
-    if energy < LEAST:
+    if energy < LEAST_SHARE:
         raise InputError(
             f"energy {energy:.3g} J/m^2: tissue has {TOUGH[0]:g} to {TOUGH[1]:g} J/m^2. Is it an energy in J (the "
             "integral of a force over a path)? Divide by the area cut, path times depth: 0.125 mJ over 1 mm by 5 mm "

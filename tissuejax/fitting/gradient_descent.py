@@ -17,7 +17,7 @@ from tissuejax.estimation.ending import Ending
 from tissuejax.estimation.problem import Problem
 from tissuejax.estimation.transforms import FAR
 
-METHODS = ("adam", "lbfgs")
+GRADIENT_METHODS = ("adam", "lbfgs")
 RATE = 0.05  # of Adam, in scaled variables, falling to a hundredth by a cosine
 QUIET = 20  # steps without the asked decrease before L-BFGS is called converged
 

@@ -25,8 +25,7 @@ from tissuejax.estimation.sigma import sigmas
 from tissuejax.estimation.stability import recorded_stability
 from tissuejax.estimation.transforms import chained
 from tissuejax.fitting.advice import warnings_of
-from tissuejax.fitting.gradient_descent import METHODS as GRADIENT_METHODS
-from tissuejax.fitting.gradient_descent import gradient_descent
+from tissuejax.fitting.gradient_descent import GRADIENT_METHODS, gradient_descent
 from tissuejax.fitting.idle import terms, woken
 from tissuejax.fitting.options import Search
 from tissuejax.fitting.result import Fit, Iterate

@@ -35,7 +35,7 @@ from tissuejax.fitting.scores import scores
 from tissuejax.fitting.simulated import Simulated
 from tissuejax.progress import Progress, Silent
 
-METHOD = "levenberg-marquardt"
+PROBED_METHOD = "levenberg-marquardt"
 LAST = 15.0  # standard errors: after a step shorter than this the rest is left to the chord steps of the end
 
 
@@ -154,7 +154,7 @@ def fit_probed(
         starts=[2 * cost],
         n_evaluations=runs.simulated.runs + runs.jacobians,
         seconds=time.perf_counter() - begun,
-        method=METHOD,
+        method=PROBED_METHOD,
         sites={
             name: {c: {"before": before[name][c], "after": rms} for c, rms in channels.items()}
             for name, channels in after.items()

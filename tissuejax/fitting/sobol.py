@@ -16,7 +16,7 @@ from SALib.sample import sobol as sampling
 from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.predictor import Predictor
 
-TIMES = 12  # samples of a channel that are analysed
+SHOWN_TIMES = 12  # samples of a channel that are analysed
 BATCH = 256
 
 
@@ -117,9 +117,9 @@ def _predicted(predictor, values, paths, draws, batched) -> tuple[list[str], Flo
     for r, recording in shapes.items():
         for c, channel in recording.channels.items():
             flat = np.asarray(channel.values).reshape(len(channel.values), -1)
-            at = np.unique(np.linspace(0, len(flat) - 1, TIMES).round().astype(int))
+            at = np.unique(np.linspace(0, len(flat) - 1, SHOWN_TIMES).round().astype(int))
             labels = [f"{r}/{c}"] if flat.shape[1] == 1 else [f"{r}/{c}[{i}]" for i in range(flat.shape[1])]
-            places += [(label, r, c, i, np.resize(at, TIMES)) for i, label in enumerate(labels)]
+            places += [(label, r, c, i, np.resize(at, SHOWN_TIMES)) for i, label in enumerate(labels)]
 
     def one(x):
         predicted = predictor.predict(values | {path: x[i] for i, path in enumerate(paths)})

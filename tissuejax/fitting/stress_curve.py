@@ -27,7 +27,7 @@ from tissuejax.fitting.setup import problem
 from tissuejax.model import Model
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
-LEAST = 0.02  # share of the greatest force below which a ratio of forces is noise
+LEAST_CHANGE = 0.02  # share of the greatest force below which a ratio of forces is noise
 CAP = 8.0  # largest factor on the stress in one iteration
 POINTS = 25
 ITERATIONS = 4  # as many as the source made
@@ -143,7 +143,7 @@ def ratio(probing: ProbingPredictor, name: str, predicted: Recording) -> tuple[n
     depth = np.interp(touch, time, lowest) - lowest
     real, simulated = (np.asarray(c.values, float)[:, 2] for c in (channel, predicted.channels["force"]))
     going = np.arange(len(time)) <= bottom
-    seen = going & (depth > 0) & (np.minimum(real, simulated) > LEAST * np.minimum(real.max(), simulated.max()))
+    seen = going & (depth > 0) & (np.minimum(real, simulated) > LEAST_CHANGE * np.minimum(real.max(), simulated.max()))
     grid = np.linspace(depth[seen].min(), depth[seen].max(), POINTS)
     order = np.argsort(depth[seen])
     smooth = [np.polyval(np.polyfit(depth[seen][order], f[seen][order], 4), grid) for f in (real, simulated)]

@@ -21,8 +21,8 @@ from tissuejax.recordings.places import resolve
 from tissuejax.recordings.recording import Geometry
 from tissuejax.units import factor, quantity
 
-KEYS = ("surface", "cloud", "mesh", "slab", "unit", "edge", "thickness", "support", "width")
-KINDS = KEYS[:4]
+BODY_KEYS = ("surface", "cloud", "mesh", "slab", "unit", "edge", "thickness", "support", "width")
+KINDS = BODY_KEYS[:4]
 
 
 def body(table: Mapping[str, object], side: Path) -> tuple[Geometry, list[str], float]:
@@ -39,8 +39,8 @@ def body(table: Mapping[str, object], side: Path) -> tuple[Geometry, list[str], 
         InputError: no kind or two, an unknown key, no unit, a surface with holes, a cloud with fewer than 30 points.
     """
     for key in table:
-        if key not in KEYS:
-            raise unknown("key in [body]", key, KEYS)
+        if key not in BODY_KEYS:
+            raise unknown("key in [body]", key, BODY_KEYS)
     kinds = [k for k in KINDS if k in table]
     if len(kinds) != 1:
         came = " and ".join(kinds) or "nothing"

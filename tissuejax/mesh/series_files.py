@@ -16,7 +16,7 @@ from tissuejax.recordings.exports.tracked import Tracked, marker_export
 from tissuejax.recordings.places import resolve
 from tissuejax.units import factor, quantity
 
-KEYS = ("file", "columns", "time", "unit", "time_unit", "sign", "noise", "rate", "every", "scale")
+SERIES_KEYS = ("file", "columns", "time", "unit", "time_unit", "sign", "noise", "rate", "every", "scale")
 
 
 @dataclass(frozen=True)
@@ -82,8 +82,8 @@ def _checked(spec: object, what: str) -> Mapping[str, object]:
     if not isinstance(spec, dict) or "file" not in spec:
         raise InputError(f'{what}: found {spec!r}, expected {{ file = "{what}.csv" }}')
     for key in spec:
-        if key not in KEYS:
-            raise unknown(f"key in {what}", key, KEYS)
+        if key not in SERIES_KEYS:
+            raise unknown(f"key in {what}", key, SERIES_KEYS)
     return spec
 
 

@@ -14,7 +14,7 @@ from tissuejax.recordings.exports import text
 from tissuejax.recordings.exports.export import BLOCK, Exported, TableExport, export_named, recognised, stacked
 from tissuejax.recordings.exports.meanings import bare, readable, size_of, split_unit
 from tissuejax.recordings.exports.tracked import marker_export
-from tissuejax.recordings.side_file import KINEMATIC, SPECIMEN
+from tissuejax.recordings.side_file import KINEMATIC, SPECIMEN_UNITS
 from tissuejax.units import quantity
 
 _NAME_KEYS = (
@@ -104,7 +104,7 @@ def guessed(
     _refuse_torsion(found, exported, path)
     known = _header_sizes(exported.header) | dict(sizes or {})
     for name, value in known.items():
-        if quantity(value, SPECIMEN[name], name) <= 0:
+        if quantity(value, SPECIMEN_UNITS[name], name) <= 0:
             raise InputError(f"{name} = {value!r}: expected a size above zero")
     try:
         pairs = chosen_pairs(found, experiment, tuple(known))
@@ -244,7 +244,7 @@ def _header_sizes(header: Mapping[str, str]) -> dict[str, str]:
 
 def _is_size(value: str, size: str) -> bool:
     try:
-        return quantity(value, SPECIMEN[size]) > 0
+        return quantity(value, SPECIMEN_UNITS[size]) > 0
     except InputError:
         return False
 

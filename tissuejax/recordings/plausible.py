@@ -14,7 +14,7 @@ from tissuejax.errors import InputError
 from tissuejax.recordings.recording import Recording, Sample
 
 STRETCH = (0.2, 4.0)  # what soft tissue bears
-STRESS = (1.0, 1e8)  # Pa: below, no cell measures it; above, it is steel's
+STRESSES = (1.0, 1e8)  # Pa: below, no cell measures it; above, it is steel's
 FEW = 10  # samples
 ABSURD = 1e20  # SI: squares and their sums stay far from overflow, and nothing measured is near
 RUN = 5  # equal samples in a row at the largest value: a sensor at its end
@@ -140,12 +140,12 @@ def _stress(recording: Recording) -> list[str]:
     if load is None:
         return []
     most = float(np.abs(load).max())
-    if most > STRESS[1]:
+    if most > STRESSES[1]:
         return [
-            f"stress reaches {most:.3g} Pa, above {STRESS[1]:.0e} Pa; kPa read as MPa, kN for N, or an area of the "
+            f"stress reaches {most:.3g} Pa, above {STRESSES[1]:.0e} Pa; kPa read as MPa, kN for N, or an area of the "
             "wrong unit?"
         ]
-    if 0 < most < STRESS[0]:
+    if 0 < most < STRESSES[0]:
         return [
             f"stress stays below {most:.3g} Pa, which no cell resolves; kPa or MPa read as Pa, mN for N, or an area in "
             "cm^2 read as m^2?"

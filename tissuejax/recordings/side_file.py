@@ -35,7 +35,7 @@ STRESS = tuple(QUANTITIES)[9:12]
 OF_CUTS = tuple(QUANTITIES)[12:]  # beside force and displacement, in tables of cuts alone
 # These turn round where compression is counted positive.
 SIGNED = ("strain", "true_strain", "displacement", "nominal_stress", "true_stress", "force")
-SPECIMEN = {
+SPECIMEN_UNITS = {
     "height": "m",
     "diameter": "m",
     "area": "m^2",
@@ -54,7 +54,7 @@ PART = (
 )
 # fmt: on
 READING = ("separator", "decimal", "comment", "skip", "header", "units_row", "format")
-WHOLE = ("part", "source", "notes", "density")
+OF_SAMPLE = ("part", "source", "notes", "density")
 
 
 @dataclass(frozen=True)
@@ -133,8 +133,8 @@ def parse(path: Path) -> SideFile:
             "recording file (.h5) of it"
         )
     for key in content:
-        if key not in PART and key not in WHOLE:
-            raise InputError(f"{path}: {unknown('key', key, [*PART, *WHOLE])}")
+        if key not in PART and key not in OF_SAMPLE:
+            raise InputError(f"{path}: {unknown('key', key, [*PART, *OF_SAMPLE])}")
     shared = {k: v for k, v in content.items() if k in PART}
     own = content.get("part", [{}])
     if not isinstance(own, list) or not all(isinstance(p, dict) for p in own):
@@ -176,7 +176,7 @@ def _part(table: Mapping[str, object]) -> Part:
             raise InputError(f"{key}: found nothing, expected {_EXAMPLES[key]}")
     get = functools.partial(_typed, table)
     experiment, sense = experiment_of(get("experiment", str, ""))
-    specimen = _in_our_words(get("specimen", dict, {}), SIZE_WORDS, SPECIMEN, "specimen")
+    specimen = _in_our_words(get("specimen", dict, {}), SIZE_WORDS, SPECIMEN_UNITS, "specimen")
     lookup = None
     if "file" in specimen or "key" in specimen:
         if not {"file", "key"} <= specimen.keys():
@@ -319,13 +319,13 @@ def _column(place: str, spec: object, si: str) -> Column:
 
 
 def _size(name: str, value: object) -> float | Column:
-    if name not in SPECIMEN:
-        raise InputError(str(unknown("size in [specimen]", name, [*SPECIMEN, "file", "key"])))
+    if name not in SPECIMEN_UNITS:
+        raise InputError(str(unknown("size in [specimen]", name, [*SPECIMEN_UNITS, "file", "key"])))
     if value == "?":
         raise InputError(f'specimen.{name}: found "?", expected a size: measure it and write it here, e.g. "25 mm"')
     if isinstance(value, dict):
-        return _column(f"specimen.{name}", value, SPECIMEN[name])
-    size = quantity(value, SPECIMEN[name], f"specimen.{name}")
+        return _column(f"specimen.{name}", value, SPECIMEN_UNITS[name])
+    size = quantity(value, SPECIMEN_UNITS[name], f"specimen.{name}")
     if size <= 0:
         raise InputError(f"specimen.{name}: found {value!r}, expected a size above zero")
     return size

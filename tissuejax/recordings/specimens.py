@@ -19,7 +19,7 @@ from tissuejax.recordings.side_file import KINEMATIC, QUANTITIES, SIGNED, STRESS
 from tissuejax.units import factor, quantity
 
 NO_TIME = "No time was recorded: samples are taken as 1 s apart."
-IN_SHEAR = ("shear", "angle", "displacement")
+SHEARED = ("shear", "angle", "displacement")
 Sizes = Mapping[str, float]
 
 
@@ -228,7 +228,7 @@ def _motion(part: Part, values: np.ndarray, kind: str, sizes: Sizes, place: str)
         found = f"{2 if two else 1} column(s) of {kind}"
         raise checks.refusal(place, "columns", found, "two for a biaxial test, one for any other")
     if (part.experiment == "simple-shear") != (kind in ("shear", "angle")) and kind != "displacement":
-        expected = f"one of {', '.join(q for q in KINEMATIC if (q in IN_SHEAR) == (part.experiment == 'simple-shear'))}"
+        expected = f"one of {', '.join(q for q in KINEMATIC if (q in SHEARED) == (part.experiment == 'simple-shear'))}"
         raise checks.refusal(place, f"columns for {part.experiment}", kind, expected)
     if kind == "radial_stretch" and part.experiment != "uniaxial":
         raise checks.refusal(place, f"columns for {part.experiment}", kind, "radial_stretch in a uniaxial test only")

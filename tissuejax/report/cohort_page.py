@@ -7,7 +7,7 @@ from tissuejax.report.cohort import Cohort
 from tissuejax.report.page import figures, render
 from tissuejax.storage import write_bytes, write_text
 
-MOST = 200  # rows on the page; all are in the table
+ROWS = 200  # rows on the page; all are in the table
 
 
 def write_cohort(rows: list[dict[str, Any]], counts: dict[str, Any], out: Path) -> dict[str, Path]:
@@ -15,7 +15,7 @@ def write_cohort(rows: list[dict[str, Any]], counts: dict[str, Any], out: Path) 
     drawn = figures(Cohort(tuple(rows)))
     columns = [n for n in dict.fromkeys(n for row in rows for n in row) if not n.startswith("std ")]
     page = render(
-        "cohort.html.j2", title=f"Campaign {out.name}", counts=counts, rows=rows[:MOST], columns=columns, most=MOST,
+        "cohort.html.j2", title=f"Campaign {out.name}", counts=counts, rows=rows[:ROWS], columns=columns, most=ROWS,
         figures=drawn,
     )  # fmt: skip
     written = {f["name"]: write_bytes(out / f"{f['name']}.png", f["png"]) for f in drawn}

@@ -9,7 +9,7 @@ from matplotlib.patches import Patch
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.report.plot import FAINT, INK, MODEL, Plot, grid
 
-MOST = 14
+MOST_CANDIDATES = 14
 
 
 class DiagnosisCandidates(Plot):
@@ -30,7 +30,7 @@ class DiagnosisCandidates(Plot):
             row["chosen"] |= c["chosen"]
             row["present"] = c["inclusion"]
             row["rank"] = min(row["rank"], np.inf if c["criterion"] is None else c["criterion"])
-        found = sorted(rows.values(), key=lambda r: r["rank"])[:MOST]
+        found = sorted(rows.values(), key=lambda r: r["rank"])[:MOST_CANDIDATES]
         return found or None
 
     def caption(self, data: list[dict]) -> str:

@@ -15,8 +15,8 @@ from tissuejax.estimation.series import Segment
 from tissuejax.report.plot import BASE, HELD, INK, MODEL, Plot, grid, legend_below, scatter
 from tissuejax.report.scales import display, label
 
-MOST = 5
-DENSE = 1500
+MOST_CURVES = 5
+DENSE_CURVE = 1500
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class DiagnosisCurves(Plot):
         marks = sorted((s for s in bench.segments if "marker" in s.component), key=miss)[-1:]
         fitted = sorted((s for s in scalar if s.recording not in bench.held_out), key=miss)[::-1]
         names = (*bench.fitted, *bench.held_out)
-        shown = fitted[: MOST - len(held) - len(marks)] + held + marks
+        shown = fitted[: MOST_CURVES - len(held) - len(marks)] + held + marks
         return [
             Curve(
                 f"{s.recording}{' (held out)' if s.recording in bench.held_out else ''}",
@@ -117,7 +117,7 @@ class DiagnosisCurves(Plot):
 
 def _draw(ax, curve: Curve, by_time: bool) -> None:
     factor, unit = display(curve.unit, float(np.nanmax(np.abs(curve.measured), initial=0.0)))
-    thin = slice(None, None, max(1, len(curve.time) // DENSE))
+    thin = slice(None, None, max(1, len(curve.time) // DENSE_CURVE))
     scale, drive_unit = display(curve.drive_unit, float(np.nanmax(np.abs(curve.drive), initial=0.0)))
     x = (curve.time if by_time else curve.drive / scale)[thin]
     colour, kind = (HELD, ", held out") if curve.held else (MODEL, "")

@@ -10,7 +10,7 @@ from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.diagnosis.stiffness_map import StiffnessMap
 from tissuejax.report.plot import INK, Plot, grid
 
-MOST = 3  # recordings shown, the strongest maps
+MOST_MAPS = 3  # recordings shown, the strongest maps
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class DiagnosisMap(Plot):
 
     def prepare(self, subject: Diagnosis) -> list[Views] | None:
         """Views of the strongest maps; None where no map was made."""
-        maps = sorted(subject.maps, key=lambda m: -float(np.abs(m.gain).sum()))[:MOST]
+        maps = sorted(subject.maps, key=lambda m: -float(np.abs(m.gain).sum()))[:MOST_MAPS]
         return [self._views(m) for m in maps] or None
 
     @staticmethod

@@ -12,7 +12,7 @@ from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.report.plot import INK, Plot, grid
 from tissuejax.report.scales import display
 
-MOST = 3  # recordings shown, those missed most
+MOST_MARKERS = 3  # recordings shown, those missed most
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class DiagnosisMarkers(Plot):
             noise = 5 * float(np.median(np.concatenate(sigma)))
             found.append(Seen(name, name in bench.held_out, before, after, noise, *chi))
         found.sort(key=lambda s: -float(np.mean(s.chi_before**2)))
-        return sorted(found[:MOST], key=lambda s: s.held) or None
+        return sorted(found[:MOST_MARKERS], key=lambda s: s.held) or None
 
     def caption(self, data: list[Seen]) -> str:
         """Which marker is worst."""

@@ -10,7 +10,7 @@ from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.report.plot import FAINT, HELD, INK, MODEL, Plot, grid
 from tissuejax.report.scales import display, label
 
-PARTS = ("drive", "rate", "time")
+SMOOTH_IN = ("drive", "rate", "time")
 
 
 class DiagnosisRemainder(Plot):
@@ -39,7 +39,7 @@ class DiagnosisRemainder(Plot):
     def caption(self, data: tuple[Remainder, float, str, tuple[str, ...]]) -> str:
         """How much is smooth and where to look first."""
         found, *_ = data
-        smooth = {k: found.share[k] for k in PARTS}
+        smooth = {k: found.share[k] for k in SMOOTH_IN}
         first = max(smooth, key=smooth.get)
         return (
             f"What the verdict leaves, as a smooth function (no physics): {1 - found.share['noise']:.0%} of its "

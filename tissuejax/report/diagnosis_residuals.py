@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.report.plot import FAINT, HELD, INK, MODEL, Plot, grid
 
-DENSE, MOST = 1500, 9
+DENSE_RESIDUAL, MOST_RESIDUALS = 1500, 9
 BAND = "#e0e6ea"
 DONE = {"color": INK, "linewidth": 0.8, "linestyle": ":"}
 
@@ -44,7 +44,7 @@ class DiagnosisResiduals(Plot):
         marks = [s for s in bench.segments if "marker" in s.component]
         marks = sorted(marks, key=lambda s: -float(np.mean(z0[s.rows] ** 2)))[:2]
         names = (*bench.fitted, *bench.held_out)
-        shown = sorted(scalar, key=lambda s: -float(np.mean(z0[s.rows] ** 2)))[: MOST - len(marks)] + marks
+        shown = sorted(scalar, key=lambda s: -float(np.mean(z0[s.rows] ** 2)))[: MOST_RESIDUALS - len(marks)] + marks
         shown = sorted(shown, key=lambda s: (names.index(s.recording), s.label))
         return [
             Pair(
@@ -71,7 +71,7 @@ class DiagnosisResiduals(Plot):
         """One panel a series."""
         figure, axes = grid(len(data), columns=2 if len(data) in (2, 4) else min(3, len(data)), height=2.5)
         for ax, pair in zip(axes, data, strict=True):
-            thin = slice(None, None, max(1, len(pair.time) // DENSE))
+            thin = slice(None, None, max(1, len(pair.time) // DENSE_RESIDUAL))
             ax.axhspan(-2, 2, color=BAND, zorder=0)
             ax.plot(pair.time[thin], pair.before[thin], color=FAINT, linewidth=0.9)
             ax.plot(pair.time[thin], pair.after[thin], color=HELD if pair.held else MODEL, linewidth=0.8)

@@ -13,8 +13,8 @@ from tissuejax.report.plot import BASE, HELD, INK, MEASURED, MODEL, Plot, grid, 
 from tissuejax.report.scales import display, label
 from tissuejax.report.series import Curve, components, curves
 
-MOST = 8  # series; more recordings than this are better read in the table
-DENSE = 400  # points drawn a panel
+PANELS = 8  # series; more recordings than this are better read in the table
+DENSE_OVERLAY = 400  # points drawn a panel
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class FitOverlay(Plot):
         found, bands, bare = curves(subject), _bands(subject), _bare(subject)
         every = [Shown(c, bands.get((c.recording, c.channel)), bare.get((c.recording, c.channel))) for c in found]
         held = [s for s in every if s.curve.held]
-        return [s for s in every if not s.curve.held][: MOST - min(len(held), MOST // 2)] + held[: MOST // 2]
+        return [s for s in every if not s.curve.held][: PANELS - min(len(held), PANELS // 2)] + held[: PANELS // 2]
 
     def caption(self, data: list[Shown]) -> str:
         """What the colours mean."""
@@ -81,7 +81,7 @@ def draw_shown(ax, shown: Shown, by_time: bool) -> None:
     factor, unit = display(curve.unit, float(np.nanmax(np.abs(curve.measured), initial=0.0)))
     x = curve.time if by_time else curve.drive
     colour, kind = (HELD, "model, held out") if curve.held else (MODEL, "model")
-    thin = slice(None, None, max(1, len(x) // DENSE))
+    thin = slice(None, None, max(1, len(x) // DENSE_OVERLAY))
     scatter(ax, x[thin], curve.measured[thin] / factor)
     if shown.bare is not None:
         ax.plot(x, shown.bare / factor, "--", color=BASE, linewidth=1.1, zorder=3, label="effects off")
@@ -99,7 +99,7 @@ def draw_curve(ax, curve: Curve) -> None:
     factor, unit = display(curve.unit, float(np.nanmax(np.abs(curve.measured), initial=0.0)))
     by_time = curve.drive is None or curve.held_still
     x = curve.time if by_time else curve.drive
-    thin = slice(None, None, max(1, len(x) // DENSE))
+    thin = slice(None, None, max(1, len(x) // DENSE_OVERLAY))
     ax.plot(x[thin], curve.measured[thin] / factor, ".", color=MEASURED, markersize=3.5, zorder=2)
     if curve.predicted is not None:
         ax.plot(x, curve.predicted / factor, color=HELD if curve.held else MODEL, linewidth=1.5, zorder=3)

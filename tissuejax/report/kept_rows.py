@@ -9,7 +9,7 @@ from tissuejax.recordings.specimens import Considered
 from tissuejax.report.plot import FAINT, INK, MODEL, Plot, grid
 from tissuejax.report.scales import display, label
 
-MOST = 6
+MOST_KEPT = 6
 
 
 class Selections(tuple):
@@ -25,7 +25,7 @@ class KeptRows(Plot):
 
     def prepare(self, subject: Selections) -> list[Considered] | None:
         """The first tests; None where nothing is cut."""
-        return list(subject)[:MOST] or None
+        return list(subject)[:MOST_KEPT] or None
 
     def caption(self, data: list[Considered]) -> str:
         """How much is kept, and by what."""

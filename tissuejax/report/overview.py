@@ -9,7 +9,7 @@ from tissuejax.report.fit_overlay import draw_curve
 from tissuejax.report.plot import Plot, grid
 from tissuejax.report.series import Curve, curves_of
 
-MOST = 18
+MOST_SHOWN = 18
 
 
 class Overview(Plot):
@@ -22,7 +22,7 @@ class Overview(Plot):
     def prepare(self, subject: Sample) -> tuple[list[Curve], int]:
         """The first series, and how many there are in all."""
         found = [curve for recording in subject.recordings.values() for curve in curves_of(recording)]
-        return found[:MOST], len(found)
+        return found[:MOST_SHOWN], len(found)
 
     def caption(self, data: tuple[list[Curve], int]) -> str:
         """How many are shown."""

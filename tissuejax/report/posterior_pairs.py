@@ -11,7 +11,7 @@ from tissuejax.fitting.result import Fit
 from tissuejax.report.plot import HELD, INK, MODEL, PAPER, Plot, tidy
 from tissuejax.report.scales import display, label
 
-MOST = 6  # parameters; more panels can't be read
+MOST_PAIRED = 6  # parameters; more panels can't be read
 SHOWN = 800  # points
 
 
@@ -34,7 +34,7 @@ class PosteriorPairs(Plot):
         """Label with unit, draws, estimate, standard error of each, in readable units."""
         declared, fit = subject.fit.problem.predictor.model.parameters, subject.fit
         found = []
-        for path, draws in list(zip(subject.posterior.paths, subject.posterior.flat.T, strict=True))[:MOST]:
+        for path, draws in list(zip(subject.posterior.paths, subject.posterior.flat.T, strict=True))[:MOST_PAIRED]:
             factor, unit = display(declared[path].unit, abs(fit.values[path]))
             name = f"{path.removeprefix('energy.').removeprefix('effects.')}{label(unit)}"
             found.append((name, draws / factor, fit.values[path] / factor, fit.std[path] / factor))

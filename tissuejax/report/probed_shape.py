@@ -11,7 +11,7 @@ from tissuejax.experiments.probing_shape import Deformed, deformed
 from tissuejax.fitting.result import Fit
 from tissuejax.report.plot import INK, MEASURED, MODEL, PAPER, Plot, tidy
 
-MOST = 3  # sites on one picture
+MOST_SITES = 3  # sites on one picture
 MARGIN = 2e-3  # m of rest around the markers in plan
 
 
@@ -27,7 +27,7 @@ class ProbedShape(Plot):
         predictor = subject.problem.predictor
         if not isinstance(predictor, ProbingPredictor):
             return None
-        return [deformed(predictor, subject.values, name) for name in predictor.names[:MOST]]
+        return [deformed(predictor, subject.values, name) for name in predictor.names[:MOST_SITES]]
 
     def caption(self, data: list[Deformed]) -> str:
         """How far the markers are apart."""

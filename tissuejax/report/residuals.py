@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tissuejax.fitting.result import Fit
-from tissuejax.report.fit_overlay import DENSE, MOST
+from tissuejax.report.fit_overlay import DENSE_OVERLAY, PANELS
 from tissuejax.report.plot import HELD, INK, MODEL, Plot, grid, legend_below
 from tissuejax.report.series import Curve, curves
 
@@ -22,7 +22,7 @@ class Residuals(Plot):
         """Curve and normalised residual of each series that has a noise level."""
         usable = [c for c in curves(subject) if c.predicted is not None and c.std]
         inside, held = [c for c in usable if not c.held], [c for c in usable if c.held]
-        shown = inside[: MOST - min(len(held), MOST // 2)] + held[: MOST // 2]
+        shown = inside[: PANELS - min(len(held), PANELS // 2)] + held[: PANELS // 2]
         return [(c, (c.predicted - c.measured) / c.std) for c in shown] or None
 
     def caption(self, data: list[tuple[Curve, np.ndarray]]) -> str:
@@ -39,7 +39,7 @@ class Residuals(Plot):
         for ax, (curve, r) in zip(axes, data, strict=True):
             by_time = curve.drive is None or curve.held_still
             x = curve.time if by_time else curve.drive
-            thin = slice(None, None, max(1, len(x) // DENSE))
+            thin = slice(None, None, max(1, len(x) // DENSE_OVERLAY))
             ax.axhspan(-1.96, 1.96, color="#e9edf0", zorder=0, label="95 % of the noise")
             ax.axhline(0, color=INK, linewidth=0.6)
             ax.plot(x[thin], r[thin], ".", color=HELD if curve.held else MODEL, markersize=3,

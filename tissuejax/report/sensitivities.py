@@ -11,7 +11,7 @@ from tissuejax.fitting.sensitivity import Sensitivity
 from tissuejax.report.plot import INK, SERIES, Plot, grid
 from tissuejax.report.scales import display, label
 
-MOST = 6
+MOST_CHANNELS = 6
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Sensitivities(Plot):
                 x, drive = np.asarray(series.time, float), None
             change = {path.removeprefix("energy."): _flat(by[key]) for path, by in subject.change.items()}
             panels.append(Panel(key, x, drive or "time (s)", change, series.unit))
-        return panels[:MOST]
+        return panels[:MOST_CHANNELS]
 
     def caption(self, data: list[Panel]) -> str:
         """How to read it."""

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from tissuejax.fitting.result import Fit
 from tissuejax.recordings.recording import Channel, Recording
 
-AXES = {"force": "xyz", "nominal_stress": "12"}
+AXES_OF = {"force": "xyz", "nominal_stress": "12"}
 DRIVES = ("stretch", "shear")
 
 
@@ -115,7 +115,7 @@ def _drive(recording: Recording, channel: Channel) -> tuple[str, np.ndarray | No
 def components(name: str, values: np.ndarray) -> list[tuple[int, str]]:
     """(column, label) of each scalar series of a channel; a cloud of markers is one."""
     if values.ndim == 2:
-        axes = AXES.get(name, "0123456789")
+        axes = AXES_OF.get(name, "0123456789")
         return [(k, f"{name} {axes[k] if k < len(axes) else k}") for k in range(values.shape[1])]
     return [(0, "marker displacement" if values.ndim == 3 else name)]
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from tissuejax.fitting.sobol import Sobol
 from tissuejax.report.plot import INK, SERIES, Plot, grid
 
-MOST = 6
+MOST_BARS = 6
 
 
 class SobolBars(Plot):
@@ -21,7 +21,7 @@ class SobolBars(Plot):
     def prepare(self, subject: Sobol) -> list[tuple[str, tuple[str, ...], np.ndarray, np.ndarray]]:
         """Channel, labels, first, total."""
         labels = tuple(path.removeprefix("energy.") for path in subject.paths)
-        return [(key, labels, subject.first[key], subject.total[key]) for key in list(subject.first)[:MOST]]
+        return [(key, labels, subject.first[key], subject.total[key]) for key in list(subject.first)[:MOST_BARS]]
 
     def caption(self, data) -> str:
         """How to read it."""

@@ -12,7 +12,7 @@ from tissuejax.surrogate.cardinal import Table, table, through
 
 DEEPEST = 0.6  # of the thickness: below it the mesh under the probe is crushed and statics fails
 RIM = 1.5  # probe radii that a place keeps from the rim
-FINE = 1e-3  # m, spacing of the table of first contact
+FINE_GRID = 1e-3  # m, spacing of the table of first contact
 SPREAD = np.array([0.7548776662466927, 0.5698402909980532])  # additive recurrence that fills the plane (Roberts 2018)
 
 
@@ -73,7 +73,7 @@ def first_contact(lobe: Lobe, box: Box, radius: float) -> Table:
     z(x, y) = max over v of top(v) + sqrt(R^2 - |v - (x, y)|^2), found by Newton from the highest of a fan of points.
     """
     top = surface_of(lobe)
-    counts = [max(2, int(np.ceil(w / FINE - 1e-9)) + 1) for w in box.high - box.low]
+    counts = [max(2, int(np.ceil(w / FINE_GRID - 1e-9)) + 1) for w in box.high - box.low]
     axes = [np.linspace(a, b, n) for a, b, n in zip(box.low, box.high, counts)]
     place = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 2)
     ring = np.linspace(0, 0.95, 20)[:, None] * radius

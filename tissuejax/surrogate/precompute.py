@@ -25,7 +25,7 @@ from tissuejax.surrogate.tabulate import full_scene, summary, surrogate
 
 BOX_MESH, TOP_MESH = (22, 22, 8), (16, 16, 6)  # elements of a site: for a box; for a whole top, in half the time
 HELD_OUT, LEVELS = 6, (0.45, 0.7, 0.9, 1.0)  # places, and shares of the greatest depth, at which the error is measured
-MOST = 33  # sites along an axis
+MOST_DEPTHS = 33  # sites along an axis
 HELPS = 0.9  # a halved spacing that leaves more than this share of the error does not help: something else is coarse
 SILENT = Silent()
 
@@ -129,7 +129,7 @@ def _refined(box: Box, rounds: Sequence[dict], wanted: float) -> Box:
             f"{said}, and was {100 * rounds[-2]['force_worst']:.2g} % with half as many along each side: places are "
             f"close enough, take more --depths (here {box.depths}), a finer --mesh, or allow more --error"
         )
-    if max(box.refined().counts) > MOST:
+    if max(box.refined().counts) > MOST_DEPTHS:
         raise InputError(f"{said}: take a smaller --reach or allow more --error")
     return box.refined()
 

@@ -36,7 +36,7 @@ from tissuejax.tled.simulate import COMPILER_OPTIONS
 STEP = 6e-4  # m between two equilibria; 1.5 mm was seen to burst
 TOLERANCE = 2e-6  # of the greatest force: 0.01 % of the probe's
 FIRST = 0.05  # of a step is the first one, from a surface that is not yet touched
-MOST = 20_000
+MOST_STEPS = 20_000
 
 
 class Matter(NamedTuple):
@@ -215,4 +215,4 @@ def ramp(
 
 def _solve(scene: Scene, place, height: float, guess):
     position = jnp.asarray(np.tile([*place, height], (2, 1)))
-    return _equilibrium(scene.put({"probe.position": position, "body.settled": guess}), 0.0, TOLERANCE, MOST, 2.5)
+    return _equilibrium(scene.put({"probe.position": position, "body.settled": guess}), 0.0, TOLERANCE, MOST_STEPS, 2.5)

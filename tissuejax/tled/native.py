@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from tissuejax.tled.scene import Probe, Scene
 
 _kernels: dict[Any, Kernel | None] = {}
-MOST = 200  # kernels that are remembered
+MOST_PROGRAMS = 200  # kernels that are remembered
 FACETS = 16  # that contact takes at once: `build.PATCH`, of which all patches are multiples
 
 
@@ -81,7 +81,7 @@ def loop(by_element: Callable, scene: "Scene", mesh: Any, history: Any) -> Calla
 
 def _remembered(key: Any, make: Callable[[], Kernel | None]) -> Kernel | None:
     if key not in _kernels:
-        if len(_kernels) >= MOST:
+        if len(_kernels) >= MOST_PROGRAMS:
             _kernels.clear()
         _kernels[key] = make()
     return _kernels[key]

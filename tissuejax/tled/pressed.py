@@ -25,7 +25,7 @@ from tissuejax.tled.scene import Scene
 from tissuejax.tled.shapes import Shape
 
 UNDER_BALL = 0.85  # logarithmic compression of the shortest element per depth over radius
-MOST = 1.1  # where balls go deeper than their radius the tissue flows aside and is not squeezed much further
+MOST_PRESSED = 1.1  # where balls go deeper than their radius the tissue flows aside and is not squeezed much further
 LAYER = 1.2  # greatest logarithmic compression under the probe over that of the whole layer
 TABOR = 0.2  # representative strain of a ball over contact radius per radius
 SPREAD = 30.0  # stiffening beyond which strain goes elsewhere
@@ -50,7 +50,7 @@ def shortest_stretch(points: Float[np.ndarray, "N 3"], shape: Shape, position: F
     deep, thick = depth(points, shape, position)
     reach = float(shape.reach())
     layer = -LAYER * math.log(max(1.0 - deep / thick, 0.05))
-    ball = min(UNDER_BALL * deep / reach, MOST) if math.isfinite(reach) else 0.0
+    ball = min(UNDER_BALL * deep / reach, MOST_PRESSED) if math.isfinite(reach) else 0.0
     return math.exp(-max(ball, layer))
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from tissuejax.recordings.exports.meanings import quantity_of, readable, split_unit
 
-SEPARATORS = (("\t", "."), (";", ","), (";", "."), (",", "."), ("\t", ","), ("|", "."), (" ", "."), (" ", ","))
+CELLS_AND_DECIMALS = (("\t", "."), (";", ","), (";", "."), (",", "."), ("\t", ","), ("|", "."), (" ", "."), (" ", ","))
 NAMES = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "space", "|": "|"}
 _NUMBER = {
     ".": re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eEdD][-+]?\d+)?|[-+]?(nan|inf)", re.I),
@@ -159,7 +159,7 @@ def _stripped(cells: list[str]) -> list[str]:
 
 def _judged(lines: Sequence[str], separator: str | None, decimal: str | None) -> tuple[str, str]:
     best, most = ((separator or ",", decimal or "."), 0)
-    for mark, sign in SEPARATORS:
+    for mark, sign in CELLS_AND_DECIMALS:
         if (separator or mark) != mark or (decimal or sign) != sign:
             continue
         score = 0
