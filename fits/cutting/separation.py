@@ -7,6 +7,7 @@ balance of energies that is fitted: toughness, bulk modulus (wedging) and fricti
 from dataclasses import replace
 
 import numpy as np
+from tissuejax.fitting.uncertainty import uncertainty
 
 from tissuejax.challenge.cutting_cases import HEIGHT
 from tissuejax.challenge.cutting_foundation import Knife, Slab, draw
@@ -21,7 +22,6 @@ from tissuejax.fitting.cut_result import ENERGY, FRICTION, ONSET
 from tissuejax.fitting.least_squares import descend
 from tissuejax.fitting.options import Unknowns
 from tissuejax.fitting.setup import problem
-from tissuejax.fitting.uncertainty import uncertainty
 from tissuejax.mesh.slab import across, block
 from tissuejax.model import Model
 from tissuejax.recordings.recording import Channel, Recording, Sample

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.probing.bench import VALUES, measured, recording, sample
-from tissuejax.diagnosis.diagnose import PROBING
 from tissuejax.diagnosis.judgement.answer import Answered, answer
+from tissuejax.diagnosis.kinds.probings import PROBING
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_discrepancy import probing_discrepancy
 from tissuejax.diagnosis.probing_view import ProbingView, probing_blocks

@@ -6,6 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import scipy.optimize
+from tissuejax.fitting.losses import soften
+from tissuejax.fitting.problem import Problem
+from tissuejax.fitting.weights import Noise, noise
 from toy import ToyPredictor, toy_sample
 
 from tissuejax.experiments.probing_settings import REFINED, ProbingSettings
@@ -13,13 +16,10 @@ from tissuejax.fitting.closing import changes
 from tissuejax.fitting.cut_resolution import resolution
 from tissuejax.fitting.gradient_descent import gradient_descent
 from tissuejax.fitting.least_squares import fit
-from tissuejax.fitting.losses import soften
 from tissuejax.fitting.memory import begun_loaded
 from tissuejax.fitting.options import Search
-from tissuejax.fitting.problem import Problem
 from tissuejax.fitting.profile import profile
 from tissuejax.fitting.separable import Projection
-from tissuejax.fitting.weights import Noise, noise
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 TRUE = {"energy.a": 80.0, "energy.b": 40.0, "energy.rate": 0.7, "energy.offset": 5.0}

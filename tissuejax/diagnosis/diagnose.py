@@ -11,31 +11,20 @@ from threadpoolctl import threadpool_limits
 
 from tissuejax.cache.crowding import make_room
 from tissuejax.cache.programs import keep_programs
-from tissuejax.diagnosis.cutting import CuttingBench, strokes_to_settle
-from tissuejax.diagnosis.cutting_discrepancy import cutting_discrepancy
-from tissuejax.diagnosis.foreseen import OPEN, foreseen
-from tissuejax.diagnosis.judgement.answer import Answered, answer, evidence_file
-from tissuejax.diagnosis.judgement.blocks import blocks, series
+from tissuejax.diagnosis import kinds
+from tissuejax.diagnosis.judgement.answer import answer, evidence_file
 from tissuejax.diagnosis.judgement.evidence import write_evidence
 from tissuejax.diagnosis.judgement.explore import Effort
-from tissuejax.diagnosis.judgement.judge import Kind
-from tissuejax.diagnosis.known import known_physics, label, tell
-from tissuejax.diagnosis.material import MaterialBench, strain_states
-from tissuejax.diagnosis.next_experiment import proposals, settling
-from tissuejax.diagnosis.next_probing import probing_proposals
-from tissuejax.diagnosis.offered import HYSTERESIS, SCATTER, offered, paced
-from tissuejax.diagnosis.probing import ProbingBench
-from tissuejax.diagnosis.probing_discrepancy import probing_discrepancy
-from tissuejax.diagnosis.probing_map import stiffness_maps
-from tissuejax.diagnosis.probing_view import ProbingView, probing_blocks
+from tissuejax.diagnosis.kinds.recorded import Question, Recorded
+from tissuejax.diagnosis.known import known_physics, label
+from tissuejax.diagnosis.offered import HYSTERESIS, SCATTER
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.effects.catalogue import effects as all_effects
 from tissuejax.energies.catalogue import energy as named_energy
 from tissuejax.energies.energy import Energy
 from tissuejax.errors import InputError, unknown
-from tissuejax.estimation.discrepancy import discrepancy
-from tissuejax.estimation.sigma import sigmas
 from tissuejax.experiments.catalogue import experiment
+from tissuejax.families import lookup, members
 from tissuejax.model import Model
 from tissuejax.progress import Progress, Silent
 from tissuejax.recordings.files import read
@@ -43,23 +32,7 @@ from tissuejax.recordings.plausible import refuse_gaps, refuse_unusable, slips
 from tissuejax.recordings.recording import Sample
 from tissuejax.storage import write_json
 
-# a set of effects costs seconds where predictions are simulations
 WRONG = 1.2  # scatter over the stated noise from which that is not believed; few know theirs better
-PROBING = Effort(
-    most=2,
-    singles=5,
-    pairs=4,
-    triples=0,
-    parents=(2, 0),
-    reshaped=(2, 1),
-    starts=1,
-    spend=600.0,
-    rounds=2,
-    iterations=4,
-    least=-1.0,
-    given_up=6.0,
-    stepwise=True,
-)
 
 
 def diagnose(
@@ -114,31 +87,11 @@ def diagnose(
     base = base if isinstance(base, Energy) else named_energy(base, ogden_form)
     physics = known_physics(stated, kind)
     energy = label(energy if isinstance(energy, str) else base.name, physics)
-    tried = None if effects is None else (*effects, *physics)
     keep = keep or (None if out is None else Path(out) / "runs")
-    every = (*fitted, *held_out)
-    if kind == "probing":
-        own = ProbingBench.of(sample, base, every, (), tried, keep)
-        narrow = own.narrowed(fitted, held_out, tried)
-        for b in (own, narrow):
-            tell(b, physics)
-        whole, bench = ProbingView.of(own), ProbingView.of(narrow)
-        effort = effort or PROBING
-    elif kind == "cutting":
-        whole = CuttingBench.of(sample, base, every, (), tried)
-        bench = CuttingBench.of(sample, base, fitted, held_out, tried, whole)
-        for b in (bench, whole):
-            tell(b, physics)
-    else:
-        sigma, more = sigmas(sample, every)
-        bench, whole = (
-            MaterialBench.of(sample, base, f, h, sigma, tried) for f, h in ((fitted, held_out), (every, ()))
-        )
-        for b in (bench, whole):
-            tell(b, physics)
-            b.candidates, left_out = offered(sample, b.candidates, effects)
-        remarks += more + left_out
-    bench.warnings += remarks
+    question = Question(sample, base, energy, fitted, held_out, physics, effects, keep)
+    asked = lookup("kind of experiment", kind, members(kinds, Recorded)).of(question)
+    bench = asked.bench
+    bench.warnings += remarks + asked.remarks
     if bad := [f"{s.recording} {s.label}" for s in bench.segments if not np.all(np.isfinite(bench.y[s.rows]))]:
         raise InputError(f"{sample.name}: {', '.join(bad)}: values that are not finite; leave these samples out")
     n = sum(len(s.time) for s in bench.segments if s.recording in fitted)
@@ -158,19 +111,10 @@ def diagnose(
         def ran(count: int) -> None:
             stage.advance(0, f"{said[0]}; {count} simulations")
 
-        if kind == "probing":
-            own.runs.report = ran
-            cut = probing_blocks(whole)
-            of = probing_discrepancy(whole, cut)
-        elif kind == "cutting":
-            cut = blocks(whole)
-            of = cutting_discrepancy(whole, cut, whole.fresh)
-        else:
-            cut = blocks(whole)
-            states = strain_states(whole)
-            of = discrepancy(series(whole, cut, states), cut.spread(whole.sigma), paced(sample), at_once=True)
-        found = answer(bench, whole, cut, of, effort, noted)
-        made = {"homogeneous": _material, "probing": _probing, "cutting": _cutting}[kind](sample, energy, base, found)
+        asked.report_to(ran)
+        cut, of = asked.left()
+        found = answer(bench, asked.whole, cut, of, effort or asked.effort, noted)
+        made = asked.finished(found)
     if found.evidence.exhausted:
         found.bench.warnings.append(
             "what may be spent on predictions was spent: larger sets of effects were not all weighed"
@@ -186,32 +130,6 @@ def diagnose(
         write_json(Path(out) / "remainder.json", made.remainders())
         write_evidence(found.evidence, evidence_file(Path(out)))
     return made
-
-
-def _probing(sample: Sample, energy: str, base: Energy, found: Answered) -> Diagnosis:
-    bench = found.bench
-    # each planned press is a simulation
-    ideas = settling([probing_proposals(sample, bench, found.chosen, r, None) for r in found.rivals[:1]])
-    maps = []
-    if found.kind != Kind.NOTHING:
-        maps = stiffness_maps(bench, found.empty.values, found.empty.prediction)
-    bench.runs.forget()
-    return Diagnosis(sample.name, energy, found, 0.0, ideas, maps)
-
-
-def _cutting(sample: Sample, energy: str, base: Energy, found: Answered) -> Diagnosis:
-    found.bench.warnings += strokes_to_settle(sample, found.bench, found)
-    return Diagnosis(sample.name, energy, found, 0.0)
-
-
-def _material(sample: Sample, energy: str, base: Energy, found: Answered) -> Diagnosis:
-    ideas = settling([proposals(sample, base, found.bench, found.chosen, r, None) for r in found.rivals[:3]])
-    open_ends = []
-    if found.kind != Kind.UNEXPLAINED:
-        keys = frozenset(found.chosen.keys)
-        open_ends = foreseen(found.bench, found.whitenings[keys], found.plain[keys])
-        found.bench.warnings += [x.sentence(found.chosen) for x in open_ends if x.over_noise > OPEN]
-    return Diagnosis(sample.name, energy, found, 0.0, ideas, [], open_ends)
 
 
 def _items(known: Sequence[str] | Mapping[str, float]) -> list[str]:

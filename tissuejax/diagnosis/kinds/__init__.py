@@ -1,0 +1,1 @@
+"""Kinds of recordings as a diagnosis goes about them, one a file."""

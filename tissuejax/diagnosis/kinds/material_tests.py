@@ -1,0 +1,57 @@
+"""Material tests: predictions in closed form, a discrepancy of laws, of times and of the rig's hysteresis."""
+
+from collections.abc import Callable
+from typing import ClassVar
+
+from tissuejax.diagnosis.foreseen import OPEN, foreseen
+from tissuejax.diagnosis.judgement.answer import Answered
+from tissuejax.diagnosis.judgement.blocks import Blocks, blocks, series
+from tissuejax.diagnosis.judgement.judge import Kind
+from tissuejax.diagnosis.kinds.recorded import Question, Recorded
+from tissuejax.diagnosis.known import tell
+from tissuejax.diagnosis.material import MaterialBench, strain_states
+from tissuejax.diagnosis.next_experiment import proposals, settling
+from tissuejax.diagnosis.offered import offered, paced
+from tissuejax.diagnosis.result import Diagnosis
+from tissuejax.estimation.discrepancy import Discrepancy, discrepancy
+from tissuejax.estimation.sigma import sigmas
+
+
+class MaterialTests(Recorded):
+    """See `Recorded`."""
+
+    name: ClassVar[str] = "homogeneous"
+
+    @classmethod
+    def of(cls, question: Question) -> "MaterialTests":
+        """See `Recorded.of`."""
+        q, left_out = question, []
+        sigma, remarks = sigmas(q.sample, q.every)
+        made = []
+        for fitted, held_out in ((q.fitted, q.held_out), (q.every, ())):
+            bench = MaterialBench.of(q.sample, q.energy, fitted, held_out, sigma, q.tried)
+            tell(bench, q.known)
+            bench.candidates, left_out = offered(q.sample, bench.candidates, q.effects)
+            made.append(bench)
+        return cls(question, *made, remarks=remarks + left_out)
+
+    def left(self) -> tuple[Blocks, Discrepancy]:
+        """See `Recorded.left`."""
+        cut, whole = blocks(self.whole), self.whole
+        states = strain_states(whole)
+        changing = paced(self.question.sample)
+        return cut, discrepancy(series(whole, cut, states), cut.spread(whole.sigma), changing, at_once=True)
+
+    def finished(self, found: Answered) -> Diagnosis:
+        """See `Recorded.finished`; what the fitted recordings leave open in the others is said too."""
+        q = self.question
+        planned = (proposals(q.sample, q.energy, found.bench, found.chosen, r, None) for r in found.rivals[:3])
+        open_ends = []
+        if found.kind != Kind.UNEXPLAINED:
+            keys = frozenset(found.chosen.keys)
+            open_ends = foreseen(found.bench, found.whitenings[keys], found.plain[keys])
+            found.bench.warnings += [x.sentence(found.chosen) for x in open_ends if x.over_noise > OPEN]
+        return Diagnosis(q.sample.name, q.label, found, 0.0, settling(list(planned)), [], open_ends)
+
+    def report_to(self, ran: Callable[[int], None]) -> None:
+        """See `Recorded.report_to`; nothing is simulated."""

@@ -1,0 +1,71 @@
+"""Probings: every prediction is a simulation, so few sets are tried, and what numerics leave open is known."""
+
+from collections.abc import Callable
+from typing import ClassVar
+
+from tissuejax.diagnosis.judgement.answer import Answered
+from tissuejax.diagnosis.judgement.blocks import Blocks
+from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.judge import Kind
+from tissuejax.diagnosis.kinds.recorded import Question, Recorded
+from tissuejax.diagnosis.known import tell
+from tissuejax.diagnosis.next_experiment import settling
+from tissuejax.diagnosis.next_probing import probing_proposals
+from tissuejax.diagnosis.probing import ProbingBench
+from tissuejax.diagnosis.probing_discrepancy import probing_discrepancy
+from tissuejax.diagnosis.probing_map import stiffness_maps
+from tissuejax.diagnosis.probing_view import ProbingView, probing_blocks
+from tissuejax.diagnosis.result import Diagnosis
+from tissuejax.estimation.discrepancy import Discrepancy
+
+# a set of effects costs seconds where predictions are simulations
+PROBING = Effort(
+    most=2,
+    singles=5,
+    pairs=4,
+    triples=0,
+    parents=(2, 0),
+    reshaped=(2, 1),
+    starts=1,
+    spend=600.0,
+    rounds=2,
+    iterations=4,
+    least=-1.0,
+    given_up=6.0,
+    stepwise=True,
+)
+
+
+class Probings(Recorded):
+    """See `Recorded`."""
+
+    name: ClassVar[str] = "probing"
+
+    @classmethod
+    def of(cls, question: Question) -> "Probings":
+        """See `Recorded.of`."""
+        q = question
+        own = ProbingBench.of(q.sample, q.energy, q.every, (), q.tried, q.keep)
+        narrow = own.narrowed(q.fitted, q.held_out, q.tried)
+        for bench in (own, narrow):
+            tell(bench, q.known)
+        return cls(question, ProbingView.of(narrow), ProbingView.of(own), PROBING)
+
+    def left(self) -> tuple[Blocks, Discrepancy]:
+        """See `Recorded.left`."""
+        cut = probing_blocks(self.whole)
+        return cut, probing_discrepancy(self.whole, cut)
+
+    def finished(self, found: Answered) -> Diagnosis:
+        """See `Recorded.finished`; each planned press is a simulation. With maps of where tissue should be stiffer."""
+        q, bench, maps = self.question, found.bench, []
+        planned = [probing_proposals(q.sample, bench, found.chosen, r, None) for r in found.rivals[:1]]
+        ideas = settling(planned)
+        if found.kind != Kind.NOTHING:
+            maps = stiffness_maps(bench, found.empty.values, found.empty.prediction)
+        bench.runs.forget()
+        return Diagnosis(q.sample.name, q.label, found, 0.0, ideas, maps)
+
+    def report_to(self, ran: Callable[[int], None]) -> None:
+        """See `Recorded.report_to`."""
+        self.whole.shown.runs.report = ran
