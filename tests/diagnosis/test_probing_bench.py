@@ -263,7 +263,7 @@ def test_a_stopped_diagnosis_finds_its_runs_again(pressed_too_deep, tmp_path, mo
     assert np.array_equal(again.predict(VALUES), told)
     assert again.runs.count == 0
     key = again.runs._key(VALUES, "a", FINE)
-    assert again.runs._path(key).exists()
+    assert again.runs.finished._path(key).exists()
     others = [
         sample(recording("a", depth=3.1e-3), recording("b", place=(-0.004, 0.004), depth=2.5e-3)),
         sample(recording("a", radius=8.1e-3), recording("b", place=(-0.004, 0.004), depth=2.5e-3)),
@@ -276,9 +276,9 @@ def test_a_stopped_diagnosis_finds_its_runs_again(pressed_too_deep, tmp_path, mo
         }
         changed = bench_of(replace(other, recordings=measured_alike), tmp_path / "runs")
         assert np.array_equal(changed.y, again.y)
-        assert not changed.runs._path(key).exists()
+        assert not changed.runs.finished._path(key).exists()
     with monkeypatch.context() as edited:
         edited.setattr(source, "LOADED", "another formula")
-        assert not again.runs._path(key).exists()
+        assert not again.runs.finished._path(key).exists()
     again.runs.forget()
     assert not (tmp_path / "runs").exists()

@@ -14,7 +14,7 @@ from jaxtyping import Float
 from tissuejax.errors import InputError
 from tissuejax.fitting.target import Target
 
-MOST = 10  # parameters
+MOST_PARAMETERS = 10  # parameters
 STEPS = 12  # Metropolis steps on a rung
 
 
@@ -42,8 +42,10 @@ def evidence(target: Target, particles: int = 500, runs: int = 4, seed: int = 0)
         InputError: a parameter without prior whose bounds are not both finite, or more than ten parameters.
     """
     problem = target.problem
-    if len(problem.free) > MOST:
-        raise InputError(f"{len(problem.free)} free parameters; evidence is computed for at most {MOST}: fix some")
+    if len(problem.free) > MOST_PARAMETERS:
+        raise InputError(
+            f"{len(problem.free)} free parameters; evidence is computed for at most {MOST_PARAMETERS}: fix some"
+        )
     lower, upper = (np.array([problem.bound(p)[k] for p in problem.free]) for k in (0, 1))
     bad = [p for p, a, b in zip(problem.free, lower, upper) if p not in problem.priors and not np.isfinite(b - a)]
     if bad:

@@ -17,9 +17,9 @@ from jaxtyping import Array, Float
 from scipy.optimize import least_squares
 
 from tissuejax.errors import InputError
+from tissuejax.estimation.problem import Problem
+from tissuejax.estimation.transforms import Box, chained
 from tissuejax.experiments.probing_sensors import read_at
-from tissuejax.fitting.problem import Problem
-from tissuejax.fitting.transforms import Box, chained
 from tissuejax.surrogate.precompute import Precomputed
 from tissuejax.surrogate.predict import force_along, within_box
 from tissuejax.surrogate.surrogate import Surrogate

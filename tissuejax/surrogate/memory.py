@@ -22,11 +22,13 @@ from tissuejax.surrogate.places import Box
 from tissuejax.surrogate.ramp import Ramp
 from tissuejax.surrogate.site_mesh import CORE, PER_RADIUS, Grid, lines, nodes
 
-TOLERATED, MODES = 0.01, 64
+TOLERATED, MOST_MODES = 0.01, 64
 DOUBLE = np.array([1.0, 1, 1, 2, 2, 2])  # off-diagonal components count twice in S : E
 POINTS = 26  # material cells along an axis at most
 FINEST = 2e-3  # m between the places of the memory's tables
-WIDEST = 0.036  # m: `MODES` modes and `POINTS` cells were tried up to 24 mm; beyond this cells are wider than a contact
+WIDEST = (
+    0.036  # m: `MOST_MODES` modes and `POINTS` cells were tried up to 24 mm; beyond this cells are wider than a contact
+)
 
 
 class Material(NamedTuple):
@@ -135,7 +137,7 @@ def projected(material: Material, lobe: Lobe, grid: Grid, dense: Dense, toleranc
     stress = np.empty((each * len(dense.places), len(metric)), np.float32)  # 130 to 180 MB for 24 x 24 mm
     for i, some in enumerate(rows("stress")):
         stress[each * i : each * (i + 1)] = some
-    found = modes(stress, tolerance, MODES, metric)
+    found = modes(stress, tolerance, MOST_MODES, metric)
     weighted = (found.shapes * metric).T
     found_stress = np.concatenate([stress[i : i + each] @ weighted for i in range(0, len(stress), each)])
     del stress
