@@ -7,7 +7,6 @@ balance of energies that is fitted: toughness, bulk modulus (wedging) and fricti
 from dataclasses import replace
 
 import numpy as np
-from tissuejax.fitting.uncertainty import uncertainty
 
 from tissuejax.challenge.cutting_cases import HEIGHT
 from tissuejax.challenge.cutting_foundation import Knife, Slab, draw
@@ -16,6 +15,7 @@ from tissuejax.diagnosis.next_cut import next_cut, planned
 from tissuejax.effects.catalogue import effect
 from tissuejax.energies.neo_hookean import NeoHookean
 from tissuejax.energies.volumetric import Quadratic
+from tissuejax.estimation.covariance import uncertainty
 from tissuejax.experiments.predictor import predictor
 from tissuejax.fitting.cut_balance import calm
 from tissuejax.fitting.cut_result import ENERGY, FRICTION, ONSET

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import scipy.optimize
-from tissuejax.fitting.losses import soften
-from tissuejax.fitting.problem import Problem
-from tissuejax.fitting.weights import Noise, noise
 from toy import ToyPredictor, toy_sample
 
+from tissuejax.estimation.losses import soften
+from tissuejax.estimation.numerical import changes
+from tissuejax.estimation.problem import Problem
+from tissuejax.estimation.weights import Weights, noise
 from tissuejax.experiments.probing_settings import REFINED, ProbingSettings
-from tissuejax.fitting.closing import changes
 from tissuejax.fitting.cut_resolution import resolution
 from tissuejax.fitting.gradient_descent import gradient_descent
 from tissuejax.fitting.least_squares import fit
@@ -78,7 +78,7 @@ def test_what_numerical_choices_leave_open_is_the_distance_to_the_limit():
     predictor = SimpleNamespace(settings=settings, with_settings=lambda s: s)
     posed = SimpleNamespace(predictor=predictor, misfit=lambda residuals, values: residuals)
     simulated = SimpleNamespace(all=lambda predictors, values: [at(s) for s in predictors])
-    seen = changes(posed, {}, simulated, finer=True, numerical=True)
+    seen = changes(posed, {}, simulated.all, finer=True, numerical=True)
     fine = settings.finer
     np.testing.assert_allclose(seen.final, at(fine), rtol=1e-12)
     np.testing.assert_allclose(seen.left["mesh"], -mesh / fine.elements**2, rtol=1e-12)
@@ -94,7 +94,7 @@ def test_a_recording_that_begins_away_from_rest_is_told_in_either_kind(kind, res
         drive = rest + np.interp(time, [0, 5, 10], [first, 0.2, 0.2])
         channel = Channel(time, 1e3 * (drive - rest), "Pa", 5.0)
         made = Recording("r", "uniaxial", {"time": time, kind: drive}, {"nominal_stress": channel}, {})
-        return begun_loaded({"r": made}, ["r"], Noise({"r/nominal_stress": 5.0}))
+        return begun_loaded({"r": made}, ["r"], Weights({"r/nominal_stress": 5.0}))
 
     assert told(0.0) == []
     (said,) = told(0.1)
@@ -136,7 +136,7 @@ def test_a_gradient_method_takes_as_many_steps_as_it_says(rng, method, steps):
     ended = gradient_descent(
         p, p.box.free(p.vector(p.start)), method, max_steps=3, tolerance=1e-9, on_accept=lambda n, *_: taken.append(n)
     )
-    assert ended.n_evaluations == steps
+    assert ended.runs == steps
     assert taken[-1] == steps
 
 
