@@ -12,9 +12,11 @@ from tissuejax.mesh import probing_files
 from tissuejax.mesh.probing_files import describes_a_body, probing_sample
 from tissuejax.recordings.files import names, read, write
 from tissuejax.recordings.guessing import Guess, guessed
+from tissuejax.recordings.layouts import layout
 from tissuejax.recordings.remarks import remarks
-from tissuejax.recordings.side_writing import side_text, template
+from tissuejax.recordings.side_writing import side_text, slab_text, template
 from tissuejax.storage import write_text
+from tissuejax.units import quantity
 
 # The example at the top of mesh/probing_files.py is the template: there is one text to keep right.
 PROBE = "\n".join(line[4:] for line in probing_files.__doc__.splitlines() if line.startswith("    ")) + "\n"
@@ -64,9 +66,13 @@ machines, rheometers and indenters are recognised by their content.
         parser.add_argument(
             "--format", default="", metavar="NAME", help="the raw export's format, if it isn't recognised"
         )
+        parser.add_argument(
+            "--columns", default="", metavar="LIST", help='what the columns hold: "time s, displacement mm, -, force N"'
+        )
         for size in SIZES:
             example = "78.5mm^2" if size == "area" else "25mm"
             parser.add_argument(f"--{size}", metavar="SIZE", help=f'{size} with its unit, e.g. "{example}"')
+        parser.add_argument("--slab", metavar="SIZE", help="of an indentation: thickness of the layer pressed")
         parser.add_argument("--force", action="store_true", help="overwrite what is there")
 
     def run(self, given: argparse.Namespace) -> Reply:
@@ -98,7 +104,10 @@ def _guessed(given: argparse.Namespace) -> Reply:
     _refuse_no_file(path)
     kind, sense = experiment_of(given.experiment) if given.experiment else ("", "")
     sizes = {size: getattr(given, size) for size in SIZES if getattr(given, size)}
-    guess = guessed(path, kind, given.positive or sense, sizes, given.format)
+    columns = given.columns.split(",") if given.columns else ()
+    if given.slab and quantity(given.slab, "m", "--slab") <= 0:
+        raise InputError(f"--slab {given.slab}: the layer's thickness, above zero")
+    guess = guessed(path, kind, given.positive or sense, sizes, given.format, columns)
     single = given.out is not None and given.out.suffix in (".h5", ".hdf5")
     side = path.with_name(f"{_stem(path)}.toml") if given.out is None or single else given.out
     if side.suffix != ".toml":
@@ -121,7 +130,8 @@ def _said(guess: Guess, side: Path, given: argparse.Namespace) -> Reply:
     for name in names(side):
         sample = read(side, name)
         for key, recording in sample.recordings.items():
-            spans = {k: (v, "") for k, v in recording.inputs.items() if "time" not in k}
+            units = {i.path: f" {i.unit}" for i in layout(recording.experiment) if i.unit != "1"}
+            spans = {k: (v, units.get(k, "")) for k, v in recording.inputs.items() if "time" not in k}
             spans |= {k: (c.values, f" {c.unit}") for k, c in recording.channels.items()}
             said = ", ".join(f"{k} {v.min():.4g} to {v.max():.4g}{unit}" for k, (v, unit) in spans.items())
             n = len(next(iter(spans.values()))[0])
@@ -133,7 +143,18 @@ def _said(guess: Guess, side: Path, given: argparse.Namespace) -> Reply:
     if given.out is not None and given.out.suffix in (".h5", ".hdf5"):
         record |= _written(str(side), given.out, given.force)
         lines.append(f"wrote {given.out}")
-    lines += [f"look   tissuejax inspect {quoted} --out look", f"fit    tissuejax fit {quoted} --energy neo-hookean"]
+    lines.append(f"look   tissuejax inspect {quoted} --out look")
+    if guess.experiment != "probing":
+        lines.append(f"fit    tissuejax fit {quoted} --energy neo-hookean")
+    elif given.slab:
+        body = side.with_name(f"{side.stem}-body.toml")
+        _free(body, given.force)
+        record["body_file"] = str(write_text(body, slab_text(guess, side.name, given.slab)))
+        lines.append(f"body   tissuejax import {shlex.quote(str(body))}   (a layer of {given.slab}; then fit its .h5)")
+    else:
+        told = shlex.join([x for name in SIZES if getattr(given, name) for x in (f"--{name}", getattr(given, name))])
+        again = " ".join(filter(None, [f"tissuejax import {table}", told, "--slab 20mm --force"]))
+        lines.append(f"fit    needs the body under the tip. If that is a flat layer, say how thick: {again}")
     return Reply(record, "\n".join(lines))
 
 

@@ -68,7 +68,9 @@ def setups(model: Model, sample: Sample, names: Sequence[str], settings: Probing
     """
     if sample.geometry is None:
         raise InputError(
-            f"sample {sample.name}: a probing needs the body; add /geometry (points, cells, fixed) to the file"
+            f"sample {sample.name}: a probing needs the body under the tip: of a flat layer "
+            "`tissuejax import TABLE --slab 20mm`, "
+            "of another shape a side file with [body] (`tissuejax import --template probe`), in HDF5 /geometry"
         )
     if sample.density is None and any(effect.name == "gravity" for effect in model.effects):
         raise InputError(f"sample {sample.name}: gravity needs the density; add the attribute `density` (kg/m^3)")

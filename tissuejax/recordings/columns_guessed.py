@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tissuejax.errors import InputError
-from tissuejax.recordings.exports.meanings import IN_SHEAR, bare, quantity_of, split_unit
+from tissuejax.errors import InputError, unknown
+from tissuejax.recordings.exports.meanings import COLUMN_WORDS, IN_SHEAR, bare, quantity_of, split_unit
 from tissuejax.recordings.side_file import KINEMATIC, QUANTITIES, STRESS
 from tissuejax.units import factor
 
@@ -51,6 +51,30 @@ def understood(
     """
     found = [_one(name, unit, numbers[name], meanings, shear) for name, unit in units.items() if name in numbers]
     return [_ratio(g, found, numbers) if g.quantity == "strain" and g.assumed else g for g in found]
+
+
+def told(columns: Sequence[str], names: Sequence[str]) -> list[Guessed]:
+    """Columns as a user tells them, in the table's order: "time s", "displacement mm", "-" for one of no use.
+
+    Raises:
+        InputError: more columns than there are, a word that is no quantity, a unit of another kind.
+    """
+    if len(columns) > len(names):
+        raise InputError(f"--columns tells of {len(columns)} columns, the table has {len(names)}: {', '.join(names)}")
+    found = []
+    for name, text in zip(names, [*columns, *["-"] * (len(names) - len(columns))], strict=True):
+        word, _, unit = text.strip().partition(" ")
+        word = COLUMN_WORDS.get(word.lower(), word.lower())
+        if word in ("-", ""):
+            found.append(Guessed(name, "", ""))
+            continue
+        if word not in QUANTITIES:
+            raise InputError(f"--columns: {unknown('quantity', word, [*QUANTITIES, '-'])}")
+        if not unit and QUANTITIES[word] != "1":
+            raise InputError(f"--columns: {text.strip()!r} has no unit; write e.g. '{word} {USUAL.get(word, 'mm')}'")
+        factor(unit or "1", QUANTITIES[word])
+        found.append(Guessed(name, word, unit.strip() or "1"))
+    return found
 
 
 def _ratio(strain: Guessed, found: Sequence[Guessed], numbers: Mapping[str, np.ndarray]) -> Guessed:
@@ -135,7 +159,8 @@ def chosen_pairs(found: Sequence[Guessed], experiment: str, sizes: Sequence[str]
         there = ", ".join(repr(g.column) for g in found)
         raise InputError(
             f"found no column of {missing} among {there}: write the side file by hand from "
-            "`tissuejax import --template uniaxial`, or name the columns plainly (time, displacement, force, ...)"
+            "`tissuejax import --template uniaxial`, or say what the columns are, in their order "
+            '(--columns "time s, displacement mm, force N"; "-" for one that is not used)'
         )
     if experiment == "biaxial":
         return [(_axes(motions) + _axes(loads), "")]

@@ -2,7 +2,9 @@
 
 import csv
 import gzip
+import io
 import re
+import zipfile
 import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -53,7 +55,7 @@ class Columns:
 
     def _number(self, cell: str, row: int, name: str | int) -> float:
         try:
-            return float(cell.replace(",", ".") if self.decimal == "," else cell)
+            return float(plain(cell, self.decimal))
         except ValueError:
             if cell.strip().lower() in MISSING:
                 return np.nan
@@ -94,6 +96,8 @@ def load(
     if not kept:
         raise InputError(f"{path}: found an empty table, expected a line of column names and rows of numbers")
     mark = SEPARATORS.get(separator or "", separator) or _guess(kept[0][1], decimal)
+    if header and not comment:
+        kept[0] = (kept[0][0], unmarked(kept[0][1]))
     split = [(line, _split(text, mark)) for line, text in kept]
     names = split[0][1] if header else [str(i + 1) for i in range(len(split[0][1]))]
     names = [name or f"column {k + 1}" for k, name in enumerate(names)]
@@ -129,6 +133,8 @@ def text_lines(path: Path) -> list[str]:
             content = gzip.decompress(content)
         except (OSError, EOFError, zlib.error) as error:
             raise InputError(f"{path}: found damaged gzip content ({error}), expected a whole .csv.gz") from error
+    if content[:4] == b"PK\x03\x04":
+        raise InputError(f"{path}: {_packed(content)}")
     if b"\x00" in content[:4096] and content[:2] not in (b"\xff\xfe", b"\xfe\xff"):
         raise InputError(f"{path}: found binary content, expected text columns; export the table as CSV")
     for encoding in ("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig", "cp1252", "latin-1"):
@@ -137,6 +143,38 @@ def text_lines(path: Path) -> list[str]:
         except UnicodeDecodeError:
             continue
     raise AssertionError("latin-1 decodes anything")
+
+
+def _packed(content: bytes) -> str:
+    """What a zip archive is, and what to do with it."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as packed:
+            inside = [n for n in packed.namelist() if not n.endswith("/")]
+    except zipfile.BadZipFile:
+        return "found a damaged zip archive, expected text columns"
+    if "xl/workbook.xml" in inside:
+        return "found an Excel workbook (.xlsx), expected text columns; save the sheet as CSV"
+    more = ", ..." if len(inside) > 3 else ""
+    return f"found a zip archive with {', '.join(inside[:3])}{more}; unpack it and name the file in it"
+
+
+def unmarked(line: str) -> str:
+    """A line of names without the comment mark that NumPy and plotting programs put before it ("# time force")."""
+    return re.sub(r"^\s*[#%]+\s+", "", line)
+
+
+def plain(cell: str, decimal: str) -> str:
+    """A number's text as Python reads it: decimal point, no marks between thousands ("1,250.5", "1.250,5")."""
+    thousands = "." if decimal == "," else ","
+    if grouped(cell, decimal):
+        cell = cell.replace(thousands, "")
+    return cell.replace(",", ".") if decimal == "," else cell
+
+
+def grouped(cell: str, decimal: str) -> bool:
+    """Whether a number has marks between its thousands; only where a decimal sign shows which mark is which."""
+    mark = "." if decimal == "," else ","
+    return bool(re.fullmatch(rf"\s*[-+]?\d{{1,3}}({re.escape(mark)}\d{{3}})+{re.escape(decimal)}\d*\s*", cell))
 
 
 def _guess(line: str, decimal: str) -> str:

@@ -1,14 +1,14 @@
 """What a file of unknown layout holds, guessed: format, columns, units, signs, specimen sizes; each guess is said."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from tissuejax.errors import InputError
-from tissuejax.recordings.columns_guessed import Guessed, backwards, chosen_pairs, chosen_time, understood
+from tissuejax.recordings.columns_guessed import Guessed, backwards, chosen_pairs, chosen_time, told, understood
 from tissuejax.recordings.delimited import Columns, text_lines
 from tissuejax.recordings.exports import text
 from tissuejax.recordings.exports.export import BLOCK, Exported, TableExport, export_named, recognised, stacked
@@ -80,7 +80,12 @@ class Guess:
 
 
 def guessed(
-    path: Path, experiment: str = "", positive: str = "", sizes: Mapping[str, str] | None = None, format: str = ""
+    path: Path,
+    experiment: str = "",
+    positive: str = "",
+    sizes: Mapping[str, str] | None = None,
+    format: str = "",
+    columns_told: Sequence[str] = (),
 ) -> Guess:
     """Look at a table and say what it holds.
 
@@ -89,6 +94,7 @@ def guessed(
         experiment, positive: where the user says them.
         sizes: specimen sizes that the user gives, texts with units.
         format: name of a raw export, where the user knows it.
+        columns_told: what the columns hold, in their order, where the user says it; see `columns_guessed.told`.
 
     Raises:
         InputError: no table of numbers, no column of deformation or load, a kind of test that no experiment predicts.
@@ -100,7 +106,13 @@ def guessed(
     said += [why] if why else []
     numbers = {n: v for n in exported.units if (v := _numbers(columns, n)) is not None}
     meanings = kind.meanings if kind else {}
-    found = understood(exported.units, numbers, meanings, experiment == "simple-shear")
+    if columns_told:
+        found = told(columns_told, [n for n in exported.units if n != BLOCK])
+        words_only = [g.column for g in found if g.quantity and g.column not in numbers]
+        if words_only:
+            raise InputError(f"{path}: column {words_only[0]!r} holds no numbers; what --columns says doesn't fit")
+    else:
+        found = understood(exported.units, numbers, meanings, experiment == "simple-shear")
     _refuse_torsion(found, exported, path)
     known = _header_sizes(exported.header) | dict(sizes or {})
     for name, value in known.items():
@@ -170,7 +182,8 @@ def _content(path: Path, format: str) -> tuple[TableExport | None, Exported, dic
         raise InputError(f"{path}: found no table of numbers, expected rows of numbers under a line of column names")
     table = whole.tables[0]
     after = table.first + len(table.rows)
-    if len(whole.tables) > 1 or any(line.strip() for line in lines[after:]):
+    side_by_side = len(text.groups(table)) > 1
+    if len(whole.tables) > 1 or side_by_side or any(line.strip() for line in lines[after:]):
         kind = export_named("text")
         exported = kind.read(path)
         blocks = f"{len(exported.blocks)} tables" if len(exported.blocks) > 1 else "text after the table"
@@ -189,7 +202,7 @@ def _content(path: Path, format: str) -> tuple[TableExport | None, Exported, dic
         exported = Exported(columns, dict.fromkeys(cells, ""), exported.header, exported.blocks)
     if table.units_row:
         reading["units_row"] = True
-    if any(name.startswith("#") for name in table.names[:1]):
+    if table.names_at is not None and lines[table.names_at].startswith("#"):
         reading["comment"] = ""
     said = [f"cells are separated by {reading['separator']}, the decimal sign is {whole.decimal!r}"]
     return None, exported, reading, said
@@ -333,4 +346,4 @@ def _sample(header: Mapping[str, str], path: Path) -> str:
         name = re.sub(r"[^\w .+-]", "-", named.get(key, "")).strip(" .")
         if 0 < len(name) <= 60 and not readable(name):
             return name
-    return re.sub(r"[{}#/\\]", "-", path.name.partition(".")[0]) or "sample"
+    return re.sub(r"[{}#/\\]", "-", path.name.removesuffix(".gz").rpartition(".")[0]) or "sample"

@@ -18,6 +18,8 @@ STRESSES = (1.0, 1e8)  # Pa: below, no cell measures it; above, it is steel's
 FEW = 10  # samples
 ABSURD = 1e20  # SI: squares and their sums stay far from overflow, and nothing measured is near
 RUN = 5  # equal samples in a row at the largest value: a sensor at its end
+MOST_OF = 0.5  # of a recording: a stress that stays that long was set, no sensor is at its end so long
+END = "the sensor was at its end"
 GAP = 20.0  # times the usual step
 FILTERED = 2.0  # noise seen eight samples apart over noise seen between neighbours
 LONG = 100  # samples from which the noise can be looked at
@@ -210,7 +212,7 @@ def _saturated(recording: Recording) -> list[str]:
         if value != 0 and b - a >= RUN and np.ptp(drive[a:b]) > 0.01 * np.ptp(drive):
             return [
                 f"stress stays at exactly {value:.4g} Pa, its {word} value, over {b - a} samples while the specimen "
-                "moves: the sensor was at its end"
+                f"moves: {'a creep test, whose stress is what was set' if b - a > MOST_OF * len(load) else END}"
             ]
     return []
 

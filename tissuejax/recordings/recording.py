@@ -65,6 +65,9 @@ class Geometry(eqx.Module):
     surface_points: Float[np.ndarray, "S 3"] | None = None
 
 
+NO_TIME = "No time was recorded: samples are taken as 1 s apart."
+
+
 class Sample(eqx.Module):
     """One sample: its recordings by name, in file order, and what is known of its body."""
 
@@ -75,3 +78,8 @@ class Sample(eqx.Module):
     gravity: tuple[float, float, float] | None = eqx.field(static=True, default=None)
     source: str = eqx.field(static=True, default="")
     notes: str = eqx.field(static=True, default="")
+
+    @property
+    def timed(self) -> bool:
+        """Whether the recordings have times of their own; else they count samples."""
+        return NO_TIME not in self.notes

@@ -4,6 +4,7 @@ import json
 from collections.abc import Sequence
 
 from tissuejax.errors import InputError
+from tissuejax.recordings.exports.meanings import EXPERIMENT_WORDS
 from tissuejax.recordings.guessing import Guess
 
 _WIDTH = 46  # column in which comments begin
@@ -81,6 +82,25 @@ def side_text(guess: Guess, file: str) -> str:
         for pair, label in guess.pairs:
             lines += ["", "[[part]]", f"recording = {json.dumps(label)}", "[part.columns]", *_pair(guess, pair)]
     return "\n".join(lines) + "\n"
+
+
+def slab_text(guess: Guess, side: str, height: str) -> str:
+    """The probing side file of an indentation into a flat layer.
+
+    Args:
+        guess: what was found in the table; side: its side file's name.
+        height: of the layer, with its unit.
+    """
+    return (
+        f"# The body under the tip of {guess.path.name}, a flat layer; `tissuejax import` makes a recording of it.\n"
+        f"sample = {json.dumps(guess.sample, ensure_ascii=False)}\n"
+        '# density = "1060 kg/m^3"\n\n'
+        "[body]\n"
+        f"slab = {json.dumps(height)}\n"
+        '# width = "120 mm"                             # six times the height if not told\n\n'
+        "[[probing]]\n"
+        f"table = {json.dumps(side, ensure_ascii=False)}\n"
+    )
 
 
 def _time(guess: Guess) -> list[str]:
@@ -174,6 +194,7 @@ def template(kind: str) -> str:
     Raises:
         InputError: an unknown kind.
     """
+    kind = kind if kind in TEMPLATES else EXPERIMENT_WORDS.get(kind, (kind, ""))[0]
     if kind not in TEMPLATES:
         raise InputError(f"--template {kind}: there is one for {', '.join(TEMPLATES)} and probe")
     experiment, positive, columns, sizes = TEMPLATES[kind]

@@ -13,12 +13,11 @@ from tissuejax.recordings import checks, rig
 from tissuejax.recordings import conversions as convert
 from tissuejax.recordings.cutting_table import cut_from
 from tissuejax.recordings.delimited import Columns
-from tissuejax.recordings.recording import Channel, Recording
+from tissuejax.recordings.recording import NO_TIME, Channel, Recording
 from tissuejax.recordings.selection import chosen, start_of
 from tissuejax.recordings.side_file import KINEMATIC, QUANTITIES, SIGNED, STRESS, Column, Part
 from tissuejax.units import factor, quantity
 
-NO_TIME = "No time was recorded: samples are taken as 1 s apart."
 SHEARED = ("shear", "angle", "displacement")
 Sizes = Mapping[str, float]
 
@@ -114,7 +113,7 @@ class Considered:
 
     Attributes:
         name: of the recording.
-        time: s, or the row's number where no time was recorded.
+        time: s, or the row's number where no time was recorded (not `timed`).
         motion, load: the measured columns, the first axis of two.
         motion_name, load_name, motion_unit, load_unit: what they are.
         kept: whether the row is in the recording.
@@ -131,6 +130,7 @@ class Considered:
     load_unit: str
     kept: Bool[np.ndarray, " n"]
     notes: tuple[str, ...]
+    timed: bool = True
 
 
 def considered(part: Part, columns: Columns, rows: np.ndarray, sizes: Sizes, name: str, place: str) -> Considered:
@@ -140,6 +140,7 @@ def considered(part: Part, columns: Columns, rows: np.ndarray, sizes: Sizes, nam
         InputError: as `recording_from`.
     """
     values, rows = _numbers(part, columns, rows, place)
+    timed = "time" in values
     time = values.pop("time", np.arange(len(rows), dtype=float))
     motion = next(q for q in values if q in KINEMATIC)
     load = next(q for q in values if q in STRESS)
@@ -148,7 +149,9 @@ def considered(part: Part, columns: Columns, rows: np.ndarray, sizes: Sizes, nam
     kept[chosen_rows.rows[:: part.every]] = True
     first = {q: values[q].reshape(len(rows), -1)[:, 0] for q in (motion, load)}
     units = QUANTITIES[motion], QUANTITIES[load]
-    return Considered(name, time, first[motion], first[load], motion, load, *units, kept, tuple(chosen_rows.notes))
+    return Considered(
+        name, time, first[motion], first[load], motion, load, *units, kept, tuple(chosen_rows.notes), timed
+    )
 
 
 def selected(part: Part, values: Mapping[str, np.ndarray], kinematic: str, load: str, sizes: Sizes, place: str) -> Kept:

@@ -3,7 +3,10 @@
 from pathlib import Path
 from typing import ClassVar
 
-from tissuejax.recordings.exports.export import Exported, TableExport, from_text
+from tissuejax.errors import InputError
+from tissuejax.recordings.delimited import text_lines
+from tissuejax.recordings.exports import text
+from tissuejax.recordings.exports.export import Exported, TableExport, stacked
 
 
 class PlainText(TableExport):
@@ -18,5 +21,14 @@ class PlainText(TableExport):
         return False
 
     def read(self, path: Path) -> Exported:
-        """Every table, numbered from 1 in the column `block` where there are several."""
-        return from_text(path, assumed=("separator, decimal sign and names are guessed anew whenever it is read",))
+        """Every table, and each group of columns whose names begin again, numbered from 1 in the column `block`."""
+        lines = text_lines(path)
+        whole = text.understood(lines)
+        tables = [part for table in whole.tables for part in text.groups(table)]
+        if not tables:
+            raise InputError(
+                f"{path}: found no table of numbers, expected rows of numbers under a line of column names"
+            )
+        top = tables[0].names_at if tables[0].names_at is not None else tables[0].first
+        assumed = ("separator, decimal sign and names are guessed anew whenever it is read",)
+        return stacked(path, tables, text.header(lines[:top], whole.separator), None, assumed, whole.decimal)

@@ -10,6 +10,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from tissuejax.recordings.delimited import grouped, unmarked
 from tissuejax.recordings.exports.meanings import quantity_of, readable, split_unit
 
 CELLS_AND_DECIMALS = (("\t", "."), (";", ","), (";", "."), (",", "."), ("\t", ","), ("|", "."), (" ", "."), (" ", ","))
@@ -64,7 +65,7 @@ def split(line: str, separator: str) -> list[str]:
 
 def is_number(cell: str, decimal: str = ".") -> bool:
     """Whether a cell is a number under this decimal sign."""
-    return bool(_NUMBER[decimal].fullmatch(cell))
+    return bool(_NUMBER[decimal].fullmatch(cell)) or grouped(cell, decimal)
 
 
 def is_row(cells: Sequence[str], decimal: str) -> bool:
@@ -180,11 +181,11 @@ def _heading(
     places = [k for k in range(max(above, first - 4), first) if lines[k].strip()]
     if not places or places[-1] < first - 2:
         return [], [], None, False, 0
-    near = _stripped(split(lines[places[-1]], separator))
+    near = _stripped(split(unmarked(lines[places[-1]]), separator))
     if len(near) < 2 or sum(is_number(c, decimal) for c in near if c) > 0.3 * len(near):
         return [], [], None, False, 0
     if len(places) > 1 and _are_units(near):
-        names = _stripped(split(lines[places[-2]], separator))
+        names = _stripped(split(unmarked(lines[places[-2]]), separator))
         bracketed = all(c[0] in "([" for c in near if c)
         named = any(quantity_of(split_unit(n)[0]) for n in names)
         if len(names) >= 2 and not any(is_number(n, decimal) for n in names) and (bracketed or named):
@@ -213,3 +214,22 @@ def _distinct(names: Sequence[str]) -> tuple[str, ...]:
         seen[name] = seen.get(name, 0) + 1
         out.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
     return tuple(out)
+
+
+def groups(table: TextTable) -> list[TextTable]:
+    """The table split where its column names begin again; rows in which a group is empty are left out of it."""
+    plain = [re.sub(r" \(\d+\)$", "", name) for name in table.names]
+    starts = [k for k, name in enumerate(plain) if name == plain[0] and name] if plain else []
+    width = starts[1] if len(starts) > 1 else len(plain)
+    if len(starts) < 2 or plain != plain[:width] * len(starts):
+        return [table]
+    found = []
+    for start in starts:
+        part = slice(start, start + width)
+        rows = [row[part] for row in table.rows if any(row[part])]
+        found.append(
+            TextTable(
+                tuple(plain[:width]), table.units[part], rows, table.first, table.names_at, table.units_row, table.above
+            )
+        )
+    return found

@@ -4,7 +4,6 @@ Columns: Prüfzeit, Standardweg, Standardkraft, Dehnung, Traversenweg (or their 
 come again to the right, each group is a specimen of its own.
 """
 
-import re
 from pathlib import Path
 from typing import ClassVar
 
@@ -30,25 +29,6 @@ class Zwick(TableExport):
         """Each table, and each group of columns in it, as a block."""
         lines = text_lines(path)
         whole = text.understood(lines)
-        tables = [part for table in whole.tables for part in groups(table)]
+        tables = [part for table in whole.tables for part in text.groups(table)]
         top = whole.tables[0].names_at or whole.tables[0].first if whole.tables else len(lines)
         return stacked(path, tables, text.header(lines[:top], whole.separator), decimal=whole.decimal)
-
-
-def groups(table: text.TextTable) -> list[text.TextTable]:
-    """The table split where its column names begin again; rows in which a group is empty are left out of it."""
-    plain = [re.sub(r" \(\d+\)$", "", name) for name in table.names]
-    starts = [k for k, name in enumerate(plain) if name == plain[0] and name] if plain else []
-    width = starts[1] if len(starts) > 1 else len(plain)
-    if len(starts) < 2 or plain != plain[:width] * len(starts):
-        return [table]
-    found = []
-    for start in starts:
-        part = slice(start, start + width)
-        rows = [row[part] for row in table.rows if any(row[part])]
-        found.append(
-            text.TextTable(
-                tuple(plain[:width]), table.units[part], rows, table.first, table.names_at, table.units_row, table.above
-            )
-        )
-    return found
