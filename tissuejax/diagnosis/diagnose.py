@@ -10,11 +10,14 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tissuejax.cache.crowding import make_room
+from tissuejax.cache.key import key
 from tissuejax.cache.programs import keep_programs
 from tissuejax.diagnosis import kinds
 from tissuejax.diagnosis.judgement.answer import answer, evidence_file
+from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import write_evidence
 from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.kinds.recorded import Question, Recorded
 from tissuejax.diagnosis.known import known_physics, label
 from tissuejax.diagnosis.offered import HYSTERESIS, SCATTER
@@ -59,8 +62,8 @@ def diagnose(
         effects: names of the effects to try; all that can act by default.
         ogden_form: for `ogden-N`.
         effort: how much is tried and may be spent.
-        keep: folder in which a stopped diagnosis of probings finds its finished simulations again (removed at the end);
-            inside `out` by default. Other diagnoses begin anew.
+        keep: folder in which a stopped diagnosis finds again what it had done, simulations of probings and sets of
+            effects of material tests (removed at the end); inside `out` by default.
         known: effects that are known to act, "gravity", "viscoelasticity.g1=0.3", or values by dotted path
             (`Diagnosis.repaired`); what is given is kept, the rest of such an effect is fitted with the base.
 
@@ -113,7 +116,11 @@ def diagnose(
 
         asked.report_to(ran)
         cut, of = asked.left()
-        found = answer(bench, asked.whole, cut, of, effort or asked.effort, noted)
+        effort = effort or asked.effort
+        kept = Kept(keep, key(sample, base, physics, (*fitted, *held_out), sorted(bench.candidates), effort, Criteria()))
+        if kept.before:
+            noted(f"going on: {kept.before} sets were weighed before it was stopped")
+        found = answer(bench, asked.whole, cut, of, effort, noted, kept=kept)
         made = asked.finished(found)
     if found.evidence.exhausted:
         found.bench.warnings.append(
@@ -129,6 +136,7 @@ def diagnose(
         write_json(Path(out) / "result.json", made.as_dict())
         write_json(Path(out) / "remainder.json", made.remainders())
         write_evidence(found.evidence, evidence_file(Path(out)))
+    kept.forget()
     return made
 
 

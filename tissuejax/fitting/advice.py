@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 MISFIT = 1.5  # chi-square per sample from which the misfit is called larger than the noise
 SERIAL = 0.5  # lag-one correlation of residuals from which standard errors are called optimistic
 CONDITION = 1e6
+TWINS = 0.05  # of their ratio: relaxation times closer than that are one
 GROSS = 5.0  # misfit in units of the noise beyond which a fit describes something else
 COARSE = 0.05  # share from which a numerical check of a simulation is a warning
 CHECKS = {  # of a simulation: what the share is of, and what to do
@@ -35,6 +36,7 @@ def warnings_of(found: "Fit") -> list[str]:
         unit = problem.predictor.model.parameters[path].unit
         said.append(f"{path} ended at its {side} bound ({limit:g} {unit}); its standard error means little there.")
     said += [begun(text) for text in found.uncertainty.sentences]
+    said += _twins(found)
     said += [text] if (text := sentence(found.stability)) else []
     if times(problem.predictor):
         said += begun_loaded(problem.predictor.sample.recordings, problem.predictor.names, problem.noise)
@@ -54,6 +56,22 @@ def warnings_of(found: "Fit") -> list[str]:
             "So chi-square says nothing on whether the model fits."
         )
     return said + _numerics(found) + _starts(found)
+
+
+def _twins(found: "Fit") -> list[str]:
+    """Relaxation times of one effect that came out alike: one term would say as much."""
+    free, said = sorted(p for p in times(found.problem.predictor) if p in found.free), []
+    for i, one in enumerate(free):
+        for other in free[i + 1 :]:
+            a, b = found.values[one], found.values[other]
+            if one.rpartition(".")[0] == other.rpartition(".")[0] and abs(math.log(a / b)) < TWINS:
+                shares = [p.replace(".tau", ".g") for p in (one, other)]
+                said.append(
+                    f"{one} and {other} are the same time ({a:.3g} s): only the sum of their shares is seen "
+                    f"({sum(found.values[p] for p in shares):.3g}). One term fewer says as much, e.g. --effect "
+                    f"viscoelasticity-{len(free) - 1}."
+                )
+    return said
 
 
 def _numerics(found: "Fit") -> list[str]:

@@ -20,8 +20,10 @@ from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.explore import Effort, Exploration
 from tissuejax.diagnosis.judgement.judge import Judgement, Kind, covering, judge
+from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.rest import level
 from tissuejax.diagnosis.judgement.search import explore
+from tissuejax.diagnosis.judgement.twins import merged
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.misfit import Misfit, white
 from tissuejax.diagnosis.refit import Refit, refit
@@ -170,14 +172,16 @@ def answer(
     effort: Effort | None = None,
     report: Callable[[str], None] | None = None,
     criteria: Criteria | None = None,
+    kept: Kept | None = None,
 ) -> Answered:
     """Weigh sets on all recordings, judge, and fit what is shown to the fitted recordings alone.
 
     Args:
         bench: with recordings held out; `whole`: the same sample with all of them fitted.
         cut, of: block means of both, and the discrepancy that any model leaves of them.
+        kept: where sets are kept for a diagnosis that is begun again.
     """
-    found = explore(whole, cut, of, criteria, effort, report)
+    found = explore(whole, cut, of, criteria, effort, report, kept)
     evidence = found.evidence(bench.fitted, bench.held_out)
     judgement = judge(evidence, criteria)
     shown = copy.copy(bench)
@@ -199,6 +203,10 @@ def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
     whitening = Whitening(bench, scales.cut, scales.blocked, weighed.parts, weighed.v, scales.widened(keys))
     misfit = whitening if keys else white(bench)
     fit = refit(bench, misfit, keys, start)
+    for key in () if bench.costly else keys:
+        while (fewer := merged(bench.candidates[key], fit.values)) is not None:
+            out.fitting.candidates = bench.candidates = {**bench.candidates, key: fewer[0]}
+            fit = refit(bench, misfit, keys, fewer[1])
     near = bench.anchored(fit.values)
     if near is not bench:
         fit = replace(fit, prediction=near.predict(fit.values))

@@ -17,9 +17,10 @@ from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.judge import log_prior
+from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.scales import Scales, squared
 from tissuejax.diagnosis.judgement.sudden import begun, beside, happened, held, joined
-from tissuejax.diagnosis.judgement.weigh import ROUNDS, Weighed, weigh
+from tissuejax.diagnosis.judgement.weigh import ROUNDS, Weighed
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.score import Score, complement, gain, trusted
 from tissuejax.diagnosis.starts import distinct, inside
@@ -73,6 +74,7 @@ class Exploration:
         bench: all recordings fitted.
         weighed: by set of keys.
         scored: linear scores at each set that was extended.
+        kept: where sets are kept for a search that is begun again.
     """
 
     bench: Bench
@@ -83,6 +85,7 @@ class Exploration:
     weighed: dict[frozenset, Weighed] = field(default_factory=dict)
     scored: dict[frozenset, list[Score]] = field(default_factory=dict)
     exhausted: bool = False
+    kept: Kept = field(default_factory=Kept)
 
     @property
     def forms(self) -> dict[str, int]:
@@ -156,14 +159,15 @@ class Exploration:
             return None
         self._tell("weighing", order)
         if len(starts) > 1:
-            tried = [weigh(self.scales, order, s, self.criteria, rounds=1, iterations=5, **options) for s in starts]
+            short = {"rounds": 1, "iterations": 5, **options}
+            tried = [self.kept.weigh(self.scales, order, s, self.criteria, **short) for s in starts]
             first = max(tried, key=lambda w: w.evidence.log_evidence)
             starts = [first.refit.values or starts[0]]
             options = {"v": first.v, **options} if first.refit.values else options
         floor = self.weighed[self.best].evidence.log_evidence - self.effort.given_up
         options = {"rounds": self.effort.rounds, "iterations": self.effort.iterations, **options}
         options = {"anchor": not self.bench.costly, **options}
-        found = weigh(self.scales, order, starts[0], self.criteria, floor=floor, **options)
+        found = self.kept.weigh(self.scales, order, starts[0], self.criteria, floor=floor, **options)
         old = self.weighed.get(key)
         if old is None or found.evidence.log_evidence > old.evidence.log_evidence:
             self.weighed[key] = found
@@ -310,7 +314,7 @@ class Exploration:
 
     def _settled(self, w: Weighed, start: Mapping[str, float], **options) -> Weighed:
         effort = {"rounds": self.effort.rounds, "iterations": self.effort.iterations}
-        return weigh(self.scales, w.evidence.keys, start, self.criteria, bench=w.bench, **effort, **options)
+        return self.kept.weigh(self.scales, w.evidence.keys, start, self.criteria, bench=w.bench, **effort, **options)
 
     def look_again(self) -> None:
         """Weigh the best sets and the base anew beside what may have happened at once by the best of them."""

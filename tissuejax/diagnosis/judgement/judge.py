@@ -15,7 +15,7 @@ Their probabilities add up to one and the most probable is given.
 
 import enum
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,8 @@ from scipy.stats import norm
 
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence, SetEvidence
+
+STRONG = math.log(20)  # odds from which evidence is called strong (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995)
 
 
 class Kind(enum.StrEnum):
@@ -123,6 +125,7 @@ def judge(evidence: Evidence, criteria: Criteria | None = None) -> Judgement:
     kind = max(Kind, key=lambda k: chances[k])
     chosen = _chosen(kind, stated, named, p, best, empty)
     ranked = sorted((k for k in named if best[k] is not chosen), key=lambda k: -p[k])
+    chosen = _plainest(groups[frozenset(chosen.names)])
     return Judgement(
         kind,
         chances,
@@ -145,6 +148,15 @@ def _chosen(kind, stated, named, p, best, empty) -> SetEvidence:
             return best[stated]
         return best[max((k for k in named if stated <= k), key=p.get)]
     return best[max(named, key=p.get)]
+
+
+def _plainest(forms: Sequence[tuple[float, SetEvidence]]) -> SetEvidence:
+    """The form of a set that is shown, of (weight, form): the one with fewest parameters that none beats strongly.
+
+    What is named does not depend on it. A third relaxation time that is no more than likely has no error to show.
+    """
+    top = max(w for w, _ in forms)
+    return min((s.k, -w, i, s) for i, (w, s) in enumerate(forms) if w > top - STRONG)[-1]
 
 
 def covering(judgement: Judgement, criteria: Criteria | None = None) -> tuple[tuple[SetEvidence, float], ...]:

@@ -14,9 +14,10 @@ from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.judgement.coloured import coloured
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.explore import Effort, Exploration
+from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.scales import Scales, scaled
 from tissuejax.diagnosis.judgement.sudden import disrupted
-from tissuejax.diagnosis.judgement.weigh import Weighed, weigh
+from tissuejax.diagnosis.judgement.weigh import Weighed
 from tissuejax.errors import NotConverged
 from tissuejax.estimation.discrepancy import Discrepancy
 
@@ -30,23 +31,25 @@ def explore(
     criteria: Criteria | None = None,
     effort: Effort | None = None,
     report: Report = None,
+    kept: Kept | None = None,
 ) -> Exploration:
     """Weigh the base model and the sets that are worth it; see the module's text.
 
     Args:
         bench: with all recordings fitted.
         cut: block means of what was measured; of: the discrepancy that any model leaves of them.
+        kept: where sets are kept for a search that is begun again; nowhere by default.
 
     Raises:
         NotConverged: the base model can't be fitted at all.
     """
-    criteria, effort = criteria or Criteria(), effort or Effort()
+    criteria, effort, kept = criteria or Criteria(), effort or Effort(), kept or Kept()
     start = {p: bench.start[p] for p in bench.base}
     if report:
         report("fitting the base model")
     bench = bench.anchored(start)
     scales = scaled(bench, cut, of, bench.y, start, criteria)
-    base = weigh(scales, (), start, criteria)
+    base = kept.weigh(scales, (), start, criteria)
     if not np.isfinite(base.evidence.log_evidence):
         raise NotConverged(
             f"the base model can't be fitted to {', '.join(bench.fitted)}: its prediction is not finite there from any "
@@ -54,11 +57,11 @@ def explore(
         )
     if (noise := coloured(scales.blocked, bench, cut, base.refit.prediction)) is not None:
         scales.blocked = noise
-        base = weigh(scales, (), base.refit.values, criteria)
-    e = alone(bench, scales, base, criteria, effort, report)
+        base = kept.weigh(scales, (), base.refit.values, criteria)
+    e = alone(bench, scales, base, criteria, effort, report, kept)
     scales, disturbed = disrupted(scales, base, criteria)
     if e.log_worth(disturbed) > e.worth(e.best):  # better than any single effect: all of them beside what happened
-        e = alone(bench, scales, disturbed, criteria, effort, report)
+        e = alone(bench, scales, disturbed, criteria, effort, report, kept)
     if bench.costly:  # one start was all that the base had
         e.leave_out(e.best)
     for size, most in ((1, effort.pairs), (2, effort.triples)):
@@ -78,13 +81,21 @@ def explore(
 
 
 def alone(
-    bench: Bench, scales: Scales, base: Weighed, criteria: Criteria, effort: Effort, report: Report = None
+    bench: Bench,
+    scales: Scales,
+    base: Weighed,
+    criteria: Criteria,
+    effort: Effort,
+    report: Report = None,
+    kept: Kept | None = None,
 ) -> Exploration:
     """An exploration with the base and all single effects weighed."""
     scales.values, scales.reference = base.refit.values, scales.cut.mean(base.refit.prediction)
     scales.bench = (base.bench or bench).anchored(base.refit.values).rooted(base.refit.values)
     scales.bench.free = bench.free  # without the priors of a set
-    e = Exploration(scales.bench, criteria, effort, scales, report or (lambda _: None), {frozenset(): base})
+    e = Exploration(
+        scales.bench, criteria, effort, scales, report or (lambda _: None), {frozenset(): base}, kept=kept or Kept()
+    )
     e.extend([frozenset()], effort.singles, effort.singles)
     for key in e.near(1)[: effort.reshaped[0]]:
         e.reshape(key)

@@ -111,6 +111,7 @@ def weigh(
     floor: float = -math.inf,
     bench: Bench | None = None,
     anchor: bool = True,
+    at: Mapping[str, float] | None = None,
 ) -> Weighed:
     """Fit the set `keys` from `start` and weigh it.
 
@@ -118,6 +119,7 @@ def weigh(
         bench: where a cheap simulation is corrected, with the correction to begin with; that of the base by default.
         anchor: whether the correction is taken anew where the fit comes to rest.
         v: squared amplitudes to begin with; of their prior's size by default.
+        at: where the fit begins, if not at `start`, by which the priors of the amplitudes go.
         floor: log evidence below which the set is hopeless and not followed further.
     """
     names = scales.bench.fitted
@@ -125,7 +127,7 @@ def weigh(
     anew, v = v is None, widths.width**2 if v is None else v
     bench, priors = with_priors(scales, keys, start, criteria, bench)
     y, best = scales.cut.mean(bench.y), None
-    at, tolerance, raw = dict(start), 0.5, None
+    at, tolerance, raw = dict(at or start), 0.5, None
     bench = bench.anchored(at) if anchor else bench.nearer(at)
     parts = scales.about(bench.predict(at), bench)
     for _turn in range(rounds):
