@@ -155,7 +155,7 @@ def main(folder: Path) -> str:
         if len(of.labels) > 3:
             record[name]["held_out"]["groups"] = covered(of, fits, True, runner)
         write_json(kept, record)
-    told = {n: r["held_out"]["specimens"]["hierarchical"]["estimate"] for n, r in record.items()}
+    told = {n: r["held_out"]["specimens"]["hierarchical"]["estimate"] for n, r in record.items() if "held_out" in r}
     return "held-out specimens inside 95 %: " + ", ".join(f"{n} {share:.0%}" for n, share in told.items())
 
 

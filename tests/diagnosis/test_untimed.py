@@ -3,7 +3,7 @@
 import numpy as np
 
 from tissuejax.diagnosis.material import MaterialBench
-from tissuejax.diagnosis.untimed import timed, without_clock
+from tissuejax.diagnosis.untimed import without_clock
 from tissuejax.effects.form import Sizes
 from tissuejax.energies.catalogue import energy
 from tissuejax.recordings.files import read
@@ -23,7 +23,7 @@ def test_a_table_without_time_is_not_asked_for_relaxation_or_drift(tmp_path):
     (tmp_path / "lab.csv").write_text("\n".join(["name,stretch,stress", *rows]) + "\n")
     (tmp_path / "lab.toml").write_text(TABLE)
     sample = read(tmp_path / "lab.toml")
-    assert not timed(sample)
+    assert not sample.timed
     sizes = Sizes(energy=100.0, strain=0.3, force=1.0, session=60.0, recording=20.0)
     noise = {"a": 5.0, "b": 5.0}
     bench = MaterialBench.of(sample, energy("neo-hookean"), ("a",), ("b",), noise, sizes=sizes)
@@ -40,4 +40,4 @@ def test_a_table_without_time_is_not_asked_for_relaxation_or_drift(tmp_path):
 def test_recordings_with_times_keep_all(tmp_path):
     from tests.specimens import every_kind
 
-    assert timed(every_kind())
+    assert every_kind().timed

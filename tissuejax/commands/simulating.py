@@ -15,10 +15,13 @@ from tissuejax.experiments.predictor import predictor
 from tissuejax.experiments.virtual import as_measured, corners, material_test, probing
 from tissuejax.model import Model
 from tissuejax.progress import for_terminal
+from tissuejax.recordings.delimited import load
+from tissuejax.recordings.exports.meanings import split_unit
+from tissuejax.recordings.exports.text import is_number
 from tissuejax.recordings.files import read, write
 from tissuejax.recordings.recording import Recording, Sample
 from tissuejax.report.recording_tables import write_table
-from tissuejax.units import quantity
+from tissuejax.units import factor, quantity
 
 BULK = 20  # bulk over shear modulus of a body fitted as incompressible, where it has to be simulated
 
@@ -36,11 +39,14 @@ What a material would show in a test: a recording file (HDF5), CSV tables, and f
   tissuejax simulate out/liver/result.json --mode planar --path path.csv --noise "20 Pa"
   tissuejax simulate --energy neo-hookean --set "energy.mu=3 kPa" --mode equibiaxial --path "0:1 1:1.2 60:1.2"
   tissuejax simulate out/liver/result.json --body liver.h5 --path probe.csv --radius "8 mm" --states
+  tissuejax simulate out/liver/result.json --body liver.h5 --path press --states
 
---path is corners TIME:VALUE in seconds and stretch (or shear; biaxial: TIME:A,B), or a CSV with a header and columns
-time and stretch (two for biaxial), in s; for a probing time, x, y, z of the tip's centre in s and m. --body FILE gives
-the body of a probing. With --states: HDF5, XDMF and VTU series for ParaView, and, where pyvista is installed, a picture
-and an animation. Without --noise nothing is added; the noise level in the file is then a placeholder, 1e-6 of the peak.
+--path is corners TIME:VALUE in seconds and stretch (or shear; biaxial: TIME:A,B), or a CSV with a line of names and
+columns time and stretch (two for biaxial). --body FILE gives the body of a probing; its path is a CSV of time, x, y, z
+of the tip's centre in the body's frame, or the name of a recording of that file, whose path and tip are taken. Units
+may stand in the names ("x (mm)"); without, it is s and m. With --states: HDF5, XDMF and VTU series for ParaView, and,
+where pyvista is installed, a picture and an animation. Without --noise nothing is added; the noise level in the file is
+then a placeholder, 1e-6 of the peak.
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
@@ -49,7 +55,9 @@ and an animation. Without --noise nothing is added; the noise level in the file 
         parser.add_argument(
             "--mode", default="uniaxial", metavar="KIND", help="uniaxial, planar, equibiaxial, biaxial, simple-shear"
         )
-        parser.add_argument("--path", required=True, metavar="PATH", help="corners TIME:VALUE, or a CSV file")
+        parser.add_argument(
+            "--path", required=True, metavar="PATH", help="corners TIME:VALUE, a CSV file, or a probing of --body"
+        )
         parser.add_argument("--rate", type=float, default=10.0, metavar="HZ", help="samples a second (default 10)")
         parser.add_argument("--body", metavar="FILE", help="sample with a body: simulate a probing of it")
         parser.add_argument("--radius", metavar="VALUE", help='of the tip, e.g. "8 mm"')
@@ -64,20 +72,35 @@ and an animation. Without --noise nothing is added; the noise level in the file 
             if not given.rate > 0:
                 raise InputError(f"--rate {given.rate:g}: wanted are samples a second, above 0")
             time, drive = (
-                table(given.path, "stretch") if Path(given.path).is_file() else corners(given.path, given.rate)
+                table(given.path, "stretch", "1") if Path(given.path).is_file() else corners(given.path, given.rate)
             )
             sample = Sample(f"{of.name}-simulated", {given.mode: material_test(given.mode, given.mode, time, drive)})
         else:
-            if given.radius is None:
-                raise InputError('a probing needs the radius of the tip: --radius "8 mm"')
             body = read(given.body)
-            time, path = table(given.path, "probe position")
-            made = probing("probing", time, path, quantity(given.radius, "m", "--radius"))
+            made = _probing(body, given)
             sample = Sample(f"{body.name}-simulated", {"probing": made}, body.geometry, body.density, body.gravity)
         unit = "N" if given.body else "Pa"
         noise = None if given.noise is None else quantity(given.noise, unit, "--noise")
         out = given.out or Path("out") / sample.name
         return simulated(of, sample, tuple(sample.recordings), given, out, noise)
+
+
+def _probing(body: Sample, given: argparse.Namespace) -> Recording:
+    """The probing that --path and --radius describe: a table's, or one that the body's file holds."""
+    radius = None if given.radius is None else quantity(given.radius, "m", "--radius")
+    known = body.recordings.get(given.path)
+    if known is not None and known.experiment == "probing":
+        of, time = known.attributes, np.asarray(known.inputs["probe/time"], float)
+        path = np.asarray(known.inputs["probe/position"], float)
+        made = probing("probing", time, path, float(of["probe/radius"]) if radius is None else radius)
+        edge = {"probe/edge": of["probe/edge"]} if "probe/edge" in of and radius is None else {}
+        return Recording(made.name, made.experiment, made.inputs, made.channels, {**made.attributes, **edge})
+    if radius is None:
+        raise InputError('a probing needs the radius of the tip: --radius "8 mm"')
+    if not Path(given.path).is_file():
+        there = ", ".join(n for n, r in body.recordings.items() if r.experiment == "probing") or "none"
+        raise InputError(f"--path {given.path}: no such file, and no probing of {given.body} (there: {there})")
+    return probing("probing", *table(given.path, "probe position", "m"), radius)
 
 
 def add_output(parser: argparse.ArgumentParser) -> None:
@@ -131,7 +154,7 @@ def simulated(
         )
     peaks = {n: _peaks(r) for n, r in recorded.items()}
     lines = [f"{n}: " + ", ".join(f"{c} to {v:.4g} {u}" for c, (v, u) in p.items()) for n, p in peaks.items()]
-    lines += [f"  ! {note}" for note in notes] + [f"{k:<24}{p}" for k, p in files.items()]
+    lines += [f"  ! {note}" for note in notes] + [f"{k:<24} {p}" for k, p in files.items()]
     record = {"recordings": peaks, "notes": notes, "files": {k: str(p) for k, p in files.items()}}
     return Reply(record, "\n".join(lines))
 
@@ -155,16 +178,23 @@ def _peaks(recording: Recording) -> dict[str, tuple[float, str]]:
     }
 
 
-def table(path: str, what: str) -> tuple[np.ndarray, np.ndarray]:
-    """Time and the other columns of a CSV with one header line.
+def table(path: str, what: str, si: str) -> tuple[np.ndarray, np.ndarray]:
+    """Time (s) and the other columns, in `si`, of a table with a line of names; units may stand in the names.
 
     Raises:
-        InputError: no such file, cells that are no numbers, fewer than two rows or columns.
+        InputError: no such file, cells that are no numbers, fewer than two rows or columns, a unit of another kind.
     """
-    try:
-        rows = np.atleast_2d(np.genfromtxt(path, delimiter=",", skip_header=1))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: not a CSV of time and {what} ({error})") from error
-    if rows.shape[0] < 2 or rows.shape[1] < 2 or not np.isfinite(rows).all():
-        raise InputError(f"{path}: wanted are a header line and rows of numbers, time (s) and {what}, with commas")
+    if not Path(path).is_file():
+        raise InputError(f"{path}: no such file; wanted is a CSV of time and {what}")
+    columns = load(Path(path))
+    names = list(columns.cells)
+    wanted = f"wanted are a line of names and rows of numbers, time (s) and {what}"
+    if len(columns.lines) < 2 or len(names) < 2 or all(is_number(n) for n in names):
+        raise InputError(f"{path}: {wanted}")
+    units = [split_unit(n)[1] or default for n, default in zip(names, ["s"] + [si] * len(names), strict=False)]
+    rows = np.stack(
+        [columns.numbers(n) * factor(u, "s" if k == 0 else si) for k, (n, u) in enumerate(zip(names, units))], 1
+    )
+    if not np.isfinite(rows).all():
+        raise InputError(f"{path}: found an empty cell; {wanted}")
     return rows[:, 0], rows[:, 1] if rows.shape[1] == 2 else rows[:, 1:]

@@ -117,7 +117,8 @@ def diagnose(
         asked.report_to(ran)
         cut, of = asked.left()
         effort = effort or asked.effort
-        kept = Kept(keep, key(sample, base, physics, (*fitted, *held_out), sorted(bench.candidates), effort, Criteria()))
+        every = (*fitted, *held_out)
+        kept = Kept(keep, key(sample, base, physics, every, sorted(bench.candidates), effort, Criteria()))
         if kept.before:
             noted(f"going on: {kept.before} sets were weighed before it was stopped")
         found = answer(bench, asked.whole, cut, of, effort, noted, kept=kept)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tissuejax.diagnosis.bench import Candidate
-from tissuejax.diagnosis.untimed import timed, without_clock, without_pace
+from tissuejax.diagnosis.untimed import without_clock, without_pace
 from tissuejax.effects.catalogue import effects
 from tissuejax.recordings.recording import Recording, Sample
 
@@ -134,7 +134,7 @@ def motion(time: np.ndarray, x: np.ndarray) -> tuple[bool, float, bool]:
 
 def paced(sample: Sample) -> bool:
     """Whether time was recorded and is more than a function of the strain: several rates, or holds."""
-    return timed(sample) and Protocol.of(sample).rates
+    return sample.timed and Protocol.of(sample).rates
 
 
 LACKING: Mapping[str, str] = {  # property of a protocol: what is said where it is not there
@@ -170,7 +170,7 @@ def offered(
         names: effects asked for; all by default.
     """
     kept, remarks = dict(candidates), []
-    if not timed(sample):
+    if not sample.timed:
         kept = without_clock(kept)
         remarks.append("no time was recorded: effects that act in time (relaxation, drift, aging) were not tried")
     for own in (SCATTER, HYSTERESIS, LAW):

@@ -11,13 +11,6 @@ from dataclasses import replace
 
 from tissuejax.diagnosis.bench import Candidate
 from tissuejax.effects.catalogue import effects
-from tissuejax.recordings.recording import Sample
-from tissuejax.recordings.specimens import NO_TIME
-
-
-def timed(sample: Sample) -> bool:
-    """Whether the sample's recordings have times of their own."""
-    return NO_TIME not in sample.notes
 
 
 def without_clock(candidates: Mapping[str, Candidate]) -> dict[str, Candidate]:

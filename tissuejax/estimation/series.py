@@ -24,6 +24,7 @@ class Segment:
         unit: SI unit of the values.
         drive: what was done at these times (stretch, shear, or depth in m), to locate by.
         drive_name, drive_unit: what the drive is called.
+        timed: whether time was recorded; else it counts samples.
     """
 
     recording: str
@@ -35,6 +36,7 @@ class Segment:
     drive: Float[np.ndarray, " n"]
     drive_name: str = "stretch"
     drive_unit: str = "1"
+    timed: bool = True
 
     @property
     def label(self) -> str:
@@ -111,9 +113,8 @@ class Series:
                     drive, what, unit = done
                     rows, at = slice(at, at + len(kept)), at + len(kept)
                     called = named(channel, width, j)
-                    segments.append(
-                        Segment(name, channel, called, rows, time[kept], seen.unit, drive[kept], what, unit)
-                    )
+                    told = drive[kept], what, unit, sample.timed
+                    segments.append(Segment(name, channel, called, rows, time[kept], seen.unit, *told))
                     y.append(flat[kept, j])
                     places.append(kept * width + j)
         return cls(tuple(segments), np.concatenate(y) if y else np.zeros(0), tuple(places))

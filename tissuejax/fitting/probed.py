@@ -163,7 +163,8 @@ def fit_probed(
     )
     found.warnings.extend(warnings_of(found))
     if shifts:
-        found.warnings.append(_numerical_sentence(problem.free, shifts, noise_part))
+        units = {p: d.unit for p, d in problem.predictor.model.parameters.items()}
+        found.warnings.append(_numerical_sentence(problem.free, shifts, noise_part, units))
     kept.done()
     noise_std = dict(zip(problem.free, map(float, noise_part.std), strict=True))
     return ProbedFit(found, shifts, sizes, noise_std, {"forward": runs.simulated.runs, "jacobian": runs.jacobians})
@@ -254,9 +255,10 @@ def _with_shifts(noise: Uncertainty, shifts: list[Float[np.ndarray, " p"]]) -> U
     return replace(noise, std=std, covariance=covariance, correlation=correlation)
 
 
-def _numerical_sentence(free, shifts, noise: Uncertainty) -> str:
+def _numerical_sentence(free, shifts, noise: Uncertainty, units: Mapping[str, str]) -> str:
     parts = []
     for i, path in enumerate(free):
         total = sum(s[path] ** 2 for s in shifts.values()) ** 0.5
-        parts.append(f"{path.split('.')[-1]} {total:.3g} (noise {noise.std[i]:.3g})")
+        unit = "" if units[path] == "1" else f" {units[path]}"
+        parts.append(f"{path.split('.')[-1]} {total:.3g}{unit} (noise {noise.std[i]:.3g}{unit})")
     return f"Standard errors include what mesh, step and penalty leave open: {', '.join(parts)}."

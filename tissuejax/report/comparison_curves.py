@@ -8,7 +8,7 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 
 from tissuejax.fitting.comparison import Comparison
-from tissuejax.report.plot import INK, MEASURED, SERIES, Plot, grid
+from tissuejax.report.plot import INK, MEASURED, SERIES, Plot, clock, grid
 from tissuejax.report.scales import display, label
 from tissuejax.report.series import Curve, curves
 
@@ -59,7 +59,7 @@ class ComparisonCurves(Plot):
             for colour, (name, every) in zip(SERIES, data.predicted.items(), strict=False):
                 ax.plot(x, every[k] / factor, color=colour, linewidth=1.3, label=name)
             ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontsize=9.5, color=INK)
-            ax.set_xlabel("time (s)" if by_time else curve.drive_name)
+            ax.set_xlabel(clock(curve.timed) if by_time else curve.drive_name)
             ax.set_ylabel(f"{curve.channel.replace('_', ' ')}{label(unit)}")
         handles, names = axes[0].get_legend_handles_labels()
         figure.legend(handles, names, loc="outside lower center", ncols=min(4, len(names)), frameon=False, fontsize=8)

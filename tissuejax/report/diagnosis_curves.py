@@ -12,7 +12,7 @@ from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.estimation.covariance import inflation
 from tissuejax.estimation.quantile import quantile
 from tissuejax.estimation.series import Segment
-from tissuejax.report.plot import BASE, HELD, INK, MODEL, Plot, grid, legend_below, scatter
+from tissuejax.report.plot import BASE, HELD, INK, MODEL, Plot, clock, grid, legend_below, scatter
 from tissuejax.report.scales import display, label
 
 MOST_CURVES = 5
@@ -28,7 +28,7 @@ class Curve:
         measured, base, improved: the series; `improved` is None where nothing was added to the base.
         half: half-width of the 95 % band about the improved (or base) model.
         drive: what was done, with its name and SI unit; `swept` if it moves enough to be an axis.
-        held: whether the recording took no part in the fits shown.
+        held: whether the recording took no part in the fits shown; timed: whether time was recorded.
     """
 
     title: str
@@ -43,6 +43,7 @@ class Curve:
     half: Float[np.ndarray, " n"]
     unit: str
     held: bool
+    timed: bool
 
     @property
     def swept(self) -> bool:
@@ -86,6 +87,7 @@ class DiagnosisCurves(Plot):
                 half[s.rows],
                 s.unit,
                 s.recording in bench.held_out,
+                s.timed,
             )
             for s in sorted(shown, key=lambda s: (names.index(s.recording), s.label))
         ]
@@ -133,7 +135,7 @@ def _draw(ax, curve: Curve, by_time: bool) -> None:
         ax.plot(x, curve.base[thin] / factor, color=BASE, linestyle=(0, (4, 2)), label="base model", **line)
         ax.plot(x, curve.improved[thin] / factor, color=colour, label=f"with effects{kind}", **line)
     ax.set_title(curve.title, loc="left", fontsize=9.5, color=INK)
-    ax.set_xlabel("time (s)" if by_time else f"{curve.drive_name}{label(drive_unit)}")
+    ax.set_xlabel(clock(curve.timed) if by_time else f"{curve.drive_name}{label(drive_unit)}")
     ax.set_ylabel(f"{curve.channel}{label(unit)}")
 
 

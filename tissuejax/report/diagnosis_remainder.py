@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from tissuejax.diagnosis.remainder import Remainder, remainder
 from tissuejax.diagnosis.result import Diagnosis
-from tissuejax.report.plot import FAINT, HELD, INK, MODEL, Plot, grid
+from tissuejax.report.plot import FAINT, HELD, INK, MODEL, Plot, clock, grid
 from tissuejax.report.scales import display, label
 
 SMOOTH_IN = ("drive", "rate", "time")
@@ -20,7 +20,7 @@ class DiagnosisRemainder(Plot):
     subject: ClassVar[type] = Diagnosis
     order: ClassVar[int] = 35
 
-    def prepare(self, subject: Diagnosis) -> tuple[Remainder, float, str, tuple[str, ...]] | None:
+    def prepare(self, subject: Diagnosis) -> tuple[Remainder, float, str, tuple[str, ...], str] | None:
         """The remainder of the worst scalar channel, its noise, the name of the drive, and what was held out."""
         bench, left = subject.search.bench, subject.verdict.chosen.prediction
         scalar = [s for s in bench.segments if "marker" not in s.component]
@@ -34,9 +34,9 @@ class DiagnosisRemainder(Plot):
         sigma = np.concatenate([bench.sigma[s.rows] for s in scalar if s.label == worst.label])
         names = {s.drive_name for s in scalar if s.label == worst.label}
         drive = f"{worst.drive_name}{label(worst.drive_unit)}" if len(names) == 1 else "stretch - 1, or shear"
-        return found, float(np.median(sigma)), drive, bench.held_out
+        return found, float(np.median(sigma)), drive, bench.held_out, clock(worst.timed)
 
-    def caption(self, data: tuple[Remainder, float, str, tuple[str, ...]]) -> str:
+    def caption(self, data: tuple[Remainder, float, str, tuple[str, ...], str]) -> str:
         """How much is smooth and where to look first."""
         found, *_ = data
         smooth = {k: found.share[k] for k in SMOOTH_IN}
@@ -47,9 +47,9 @@ class DiagnosisRemainder(Plot):
             "numbers are in remainder.json."
         )
 
-    def draw(self, data: tuple[Remainder, float, str, tuple[str, ...]]) -> Figure:
+    def draw(self, data: tuple[Remainder, float, str, tuple[str, ...], str]) -> Figure:
         """Drive, rate, time (a curve for each recording)."""
-        found, sigma, drive, held = data
+        found, sigma, drive, held, passed = data
         figure, axes = grid(3, height=2.6, sharey=True)
         largest = max(float(np.max(np.abs(c["value"]), initial=0.0)) for c in found.curves.values())
         factor, unit = display(found.unit, max(largest, sigma))
@@ -69,6 +69,6 @@ class DiagnosisRemainder(Plot):
                 axes[2].plot(curve["x"], np.array(curve["value"]) / factor, color=colour, linewidth=1.2)
         axes[0].set_xlabel(drive)
         axes[1].set_xlabel("its rate (m/s)" if drive.endswith("(m)") else "its rate (1/s)")
-        axes[2].set_xlabel("time (s); a curve a recording, orange held out")
+        axes[2].set_xlabel(f"{passed}; a curve a recording, orange held out")
         axes[0].set_ylabel(f"{found.channel.replace('_', ' ')}{label(unit)}")
         return figure

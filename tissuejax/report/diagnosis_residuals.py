@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from tissuejax.diagnosis.result import Diagnosis
-from tissuejax.report.plot import FAINT, HELD, INK, MODEL, Plot, grid
+from tissuejax.report.plot import FAINT, HELD, INK, MODEL, Plot, clock, grid
 
 DENSE_RESIDUAL, MOST_RESIDUALS = 1500, 9
 BAND = "#e0e6ea"
@@ -27,6 +27,7 @@ class Pair:
     drive: np.ndarray
     drive_name: str
     held: bool
+    timed: bool
 
 
 class DiagnosisResiduals(Plot):
@@ -55,6 +56,7 @@ class DiagnosisResiduals(Plot):
                 s.drive,
                 s.drive_name,
                 s.recording in bench.held_out,
+                s.timed,
             )
             for s in shown
         ]
@@ -76,7 +78,7 @@ class DiagnosisResiduals(Plot):
             ax.plot(pair.time[thin], pair.before[thin], color=FAINT, linewidth=0.9)
             ax.plot(pair.time[thin], pair.after[thin], color=HELD if pair.held else MODEL, linewidth=0.8)
             ax.set_title(pair.title + (" (held out)" if pair.held else ""), loc="left", fontsize=9.5, color=INK)
-            ax.set_xlabel("time (s)")
+            ax.set_xlabel(clock(pair.timed))
             ax.set_ylabel("residual / noise")
             behind = ax.twinx()
             behind.plot(pair.time[thin], pair.drive[thin], **DONE)

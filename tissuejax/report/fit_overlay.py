@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from tissuejax.fitting.bands import half_width, prediction_std
 from tissuejax.fitting.result import Fit
-from tissuejax.report.plot import BASE, HELD, INK, MEASURED, MODEL, Plot, grid, legend_below, scatter
+from tissuejax.report.plot import BASE, HELD, INK, MEASURED, MODEL, Plot, clock, grid, legend_below, scatter
 from tissuejax.report.scales import display, label
 from tissuejax.report.series import Curve, components, curves
 
@@ -90,7 +90,7 @@ def draw_shown(ax, shown: Shown, by_time: bool) -> None:
         ax.fill_between(x, low, high, color=colour, alpha=0.22, linewidth=0, label="95 % band")
     ax.plot(x, curve.predicted / factor, color=colour, linewidth=1.3, zorder=4, label=kind)
     ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontsize=9.5, color=INK)
-    ax.set_xlabel("time (s)" if by_time else curve.drive_name)
+    ax.set_xlabel(clock(curve.timed) if by_time else curve.drive_name)
     ax.set_ylabel(f"{curve.channel.replace('_', ' ')}{label(unit)}")
 
 
@@ -104,7 +104,7 @@ def draw_curve(ax, curve: Curve) -> None:
     if curve.predicted is not None:
         ax.plot(x, curve.predicted / factor, color=HELD if curve.held else MODEL, linewidth=1.5, zorder=3)
     ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontsize=9.5, color=INK)
-    ax.set_xlabel("time (s)" if by_time else curve.drive_name)
+    ax.set_xlabel(clock(curve.timed) if by_time else curve.drive_name)
     ax.set_ylabel(f"{curve.channel.replace('_', ' ')}{label(unit)}")
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tissuejax.recordings.specimens import Considered
-from tissuejax.report.plot import FAINT, INK, MODEL, Plot, grid
+from tissuejax.report.plot import FAINT, INK, MODEL, Plot, clock, grid
 from tissuejax.report.scales import display, label
 
 MOST_KEPT = 6
@@ -39,7 +39,7 @@ class KeptRows(Plot):
             by_load, load_unit = display(one.load_unit, float(np.abs(one.load).max(initial=0.0)))
             by_motion, motion_unit = display(one.motion_unit, float(np.abs(one.motion).max(initial=0.0)))
             for ax, x, name in (
-                (axes[2 * k], one.time, "time (s)"),
+                (axes[2 * k], one.time, clock(one.timed)),
                 (axes[2 * k + 1], one.motion / by_motion, f"{one.motion_name.replace('_', ' ')}{label(motion_unit)}"),
             ):
                 ax.plot(x, one.load / by_load, color=FAINT, linewidth=0.8, label="in the table")

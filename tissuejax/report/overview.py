@@ -2,9 +2,10 @@
 
 from typing import ClassVar
 
+import numpy as np
 from matplotlib.figure import Figure
 
-from tissuejax.recordings.recording import Sample
+from tissuejax.recordings.recording import Recording, Sample
 from tissuejax.report.fit_overlay import draw_curve
 from tissuejax.report.plot import Plot, grid
 from tissuejax.report.series import Curve, curves_of
@@ -21,7 +22,8 @@ class Overview(Plot):
 
     def prepare(self, subject: Sample) -> tuple[list[Curve], int]:
         """The first series, and how many there are in all."""
-        found = [curve for recording in subject.recordings.values() for curve in curves_of(recording)]
+        every = subject.recordings.values()
+        found = [curve for r in every for curve in curves_of(r, timed=subject.timed) if not _nothing(curve, r)]
         return found[:MOST_SHOWN], len(found)
 
     def caption(self, data: tuple[list[Curve], int]) -> str:
@@ -35,3 +37,9 @@ class Overview(Plot):
         for ax, curve in zip(axes, data[0], strict=True):
             draw_curve(ax, curve)
         return figure
+
+
+def _nothing(curve: Curve, recording: Recording) -> bool:
+    """Whether a series is a component that was not measured: zero throughout, where another one is not."""
+    whole = [c for name, c in recording.channels.items() if curve.channel.startswith(f"{name} ")]
+    return bool(whole) and not np.any(curve.measured) and bool(np.any(np.asarray(whole[0].values)))

@@ -67,6 +67,11 @@ def scatter(ax, x, y) -> None:
     ax.plot(x, y, "o", color=MEASURED, alpha=0.6, markersize=4, markeredgewidth=0, zorder=2, label="measured")
 
 
+def clock(timed: bool) -> str:
+    """The name of an axis of time; without a recorded time it counts samples."""
+    return "time (s)" if timed else "sample"
+
+
 def tidy(ax) -> None:
     """The house look of an axis: no box, thin grid, dark text."""
     ax.spines[["top", "right"]].set_visible(False)

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from tissuejax.fitting.result import Fit
 from tissuejax.report.fit_overlay import DENSE_OVERLAY, PANELS
-from tissuejax.report.plot import HELD, INK, MODEL, Plot, grid, legend_below
+from tissuejax.report.plot import HELD, INK, MODEL, Plot, clock, grid, legend_below
 from tissuejax.report.series import Curve, curves
 
 
@@ -45,7 +45,7 @@ class Residuals(Plot):
             ax.plot(x[thin], r[thin], ".", color=HELD if curve.held else MODEL, markersize=3,
                     label="held out" if curve.held else "fitted")  # fmt: skip
             ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontsize=9.5, color=INK)
-            ax.set_xlabel("time (s)" if by_time else curve.drive_name)
+            ax.set_xlabel(clock(curve.timed) if by_time else curve.drive_name)
             ax.set_ylabel(f"{curve.channel.replace('_', ' ')}\nresidual / noise")
         legend_below(figure, axes)
         return figure

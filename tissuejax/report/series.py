@@ -24,6 +24,7 @@ class Curve:
         measured, predicted: in `unit`.
         std: noise in `unit`, or None.
         held: True if the recording took no part in the fit.
+        timed: whether time was recorded; else `time` counts samples.
     """
 
     recording: str
@@ -36,6 +37,7 @@ class Curve:
     unit: str
     std: float | None
     held: bool = False
+    timed: bool = True
 
     @property
     def monotone(self) -> bool:
@@ -56,7 +58,9 @@ class Curve:
         return float(np.diff(self.time)[still].sum()) > 0.3 * float(np.ptp(self.time))
 
 
-def curves_of(recording: Recording, prediction: Recording | None = None, std=None, held: bool = False) -> list[Curve]:
+def curves_of(
+    recording: Recording, prediction: Recording | None = None, std=None, held: bool = False, timed: bool = True
+) -> list[Curve]:
     """All scalar series of a recording; clouds of markers as their mean displacement, each along its own way."""
     found = []
     for name, channel in recording.channels.items():
@@ -87,6 +91,7 @@ def curves_of(recording: Recording, prediction: Recording | None = None, std=Non
                     channel.unit,
                     level,
                     held,
+                    timed,
                 )
             )
     return found
@@ -94,13 +99,14 @@ def curves_of(recording: Recording, prediction: Recording | None = None, std=Non
 
 def curves(found: Fit) -> list[Curve]:
     """All series of a fit: fitted recordings first, held-out ones after."""
-    measured, std = found.problem.predictor.sample.recordings, found.problem.noise.std
+    sample, std = found.problem.predictor.sample, found.problem.noise.std
+    measured = sample.recordings
     inside = found.problem.predictor.names
     held = [name for name in found.predictions if name not in inside]
     return [
         curve
         for name in (*inside, *held)
-        for curve in curves_of(measured[name], found.predictions[name], std, name in held)
+        for curve in curves_of(measured[name], found.predictions[name], std, name in held, sample.timed)
     ]
 
 

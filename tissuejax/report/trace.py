@@ -27,20 +27,23 @@ class Trace(Plot):
         """Counts."""
         ends = data["ends"][np.isfinite(data["ends"])]
         same = int(np.sum(ends <= ends.min() * (1 + 1e-3) + 1e-9))
+        if len(data["ends"]) < 2:
+            return f"{len(data['steps'])} accepted steps."
         return (
             f"{len(data['steps'])} accepted steps of the best start; {same} of {len(data['ends'])} starts "
             f"ended at the best fit."
         )
 
     def draw(self, data: dict[str, np.ndarray]) -> Figure:
-        """Logarithmic."""
-        figure, (steps, ends) = grid(2, columns=2, height=2.4)
+        """Logarithmic; the ends only where there was more than one start."""
+        figure, (steps, *more) = grid(1 + (len(data["ends"]) > 1), columns=2, height=2.4)
         steps.semilogy(np.arange(1, len(data["steps"]) + 1), data["steps"], ".-", color=MODEL)
         steps.set_xlabel("accepted step")
         steps.set_ylabel("chi-square")
         order = np.sort(data["ends"])
-        ends.semilogy(np.arange(1, len(order) + 1), order, "o", color=MODEL, markerfacecolor=FAINT)
-        ends.xaxis.set_major_locator(MaxNLocator(integer=True))
-        ends.set_xlabel("start, sorted")
-        ends.set_ylabel("chi-square at its end")
+        for ends in more:
+            ends.semilogy(np.arange(1, len(order) + 1), order, "o", color=MODEL, markerfacecolor=FAINT)
+            ends.xaxis.set_major_locator(MaxNLocator(integer=True))
+            ends.set_xlabel("start, sorted")
+            ends.set_ylabel("chi-square at its end")
         return figure
