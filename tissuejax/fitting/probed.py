@@ -7,7 +7,7 @@ are changed (a linear shift: the change of the prediction through the Jacobian).
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
