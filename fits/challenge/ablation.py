@@ -23,8 +23,12 @@ from tissuejax.diagnosis.judgement.rejudge import verdict_of
 EDGES = (0.5, 0.7, 0.8, 0.9, 0.95)  # of stated probability
 
 
+# What sets are fitted and weighed by is in their evidence already: these want the diagnoses run again.
+WEIGHED = ("unknown", "shares", "strange", "sudden", "change", "rig", "shape", "misstated")
+
+
 def settings() -> Iterator[tuple[str, Criteria]]:
-    """The criteria as they are, and with one number changed."""
+    """The criteria as they are, and with one number changed, of all that a judge reads (all but `WEIGHED`)."""
     usual = Criteria()
     yield "as they are", usual
     for coarse in (25.0, 50.0, 100.0, 150.0, 300.0, 1000.0, 1e9):
@@ -35,6 +39,11 @@ def settings() -> Iterator[tuple[str, Criteria]]:
         yield f"negligible below {negligible}", replace(usual, negligible=negligible)
     for sizes in ((0.25, 0.25, 0.25, 0.25), (0.6, 0.3, 0.08, 0.02), (0.8, 0.18, 0.018, 0.002)):
         yield f"sizes {sizes}", replace(usual, sizes=sizes)
+    for name in ("counted", "unseen", "covered"):
+        value = getattr(usual, name)
+        for factor in (0.5, 2.0):
+            other = min(factor * value, 0.99) if isinstance(value, float) and value < 1 else type(value)(factor * value)
+            yield f"{name} {other:g}", replace(usual, **{name: other})
 
 
 def stored(folder: Path) -> dict[str, tuple[Evidence, dict]]:
