@@ -1,6 +1,6 @@
 """Full refits: all base parameters, amplitudes and shapes of a set of candidates together, within bounds.
 
-Every step is a small bounded linear problem (`estimation.methods.corrected`), so that one-sided amplitudes rest on
+Every step is a small bounded linear problem (`estimation.methods.broyden`), so that one-sided amplitudes rest on
 their bound exactly and leave it when the data want them to. Positive shapes move in logarithm. What belongs to one
 recording alone (an offset, a phase) is fitted on the held-out recordings too, all else fixed.
 """
@@ -16,7 +16,7 @@ from tissuejax.diagnosis.bench import Bench, Free
 from tissuejax.diagnosis.misfit import Misfit
 from tissuejax.estimation.covariance import inflation, standard_errors
 from tissuejax.estimation.descent import Ended, descend
-from tissuejax.estimation.methods import corrected
+from tissuejax.estimation.methods import broyden
 from tissuejax.estimation.posed import LeastSquares
 from tissuejax.estimation.reach import Reach
 from tissuejax.estimation.solution import Limits, Solution
@@ -140,7 +140,7 @@ class Descent(LeastSquares):
     def run(
         self, x: Float[np.ndarray, " p"], iterations: int, tolerance: float, jac: Float[np.ndarray, "n p"] | None = None
     ) -> Ended:
-        """A `corrected` descent from x.
+        """A `broyden` descent from x.
 
         Args:
             tolerance: of chi-square.
@@ -148,7 +148,7 @@ class Descent(LeastSquares):
         """
         costly = self.bench.costly
         reach = Reach(self.low, self.high, self.scale, turns=self.turns)
-        method = corrected(reach, iterations, tolerance, jac, self.sharpen if costly else None, costly)
+        method = broyden(reach, iterations, tolerance, jac, self.sharpen if costly else None, costly)
         return descend(self, x, method)
 
     def prediction(self, ended: Ended) -> Float[np.ndarray, " N"]:

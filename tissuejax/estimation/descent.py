@@ -3,14 +3,15 @@
 Half the sum of squares of residuals r(y) is made small by damped linear steps. What tells one descent from another is
 five parts, and a method is a choice of them:
 
-| method (`methods`) | for | derivatives | reach of a step | damped by | taken from | end |
-|---|---|---|---|---|---|---|
-| `exact` | fits of material tests | at every trial | anywhere | curvature at first | 1e-3 of its promise | `Precise` |
-| `sparing` | fits of probings | where accepted | one unit a coordinate | curvature | 1e-3 of its promise | `InErrors` |
-| `corrected` | refits of a diagnosis | corrected on the way | bounds, angles | curvature | any gain | `InChiSquare` |
+| method (`methods`) | derivatives | reach of a step | damped by | a step is taken from | end |
+|---|---|---|---|---|---|
+| `trust_region` | at every trial | anywhere | curvature at first | 1e-3 of its promise | `Precise` |
+| `marquardt` | where accepted | one unit a coordinate | curvature | 1e-3 of its promise | `InErrors` |
+| `broyden` | corrected on the way | bounds, angles | curvature | any gain | `InChiSquare` |
 
-Three ways of making a misfit small are no descents of this kind and stay beside it: variable projection wraps `exact`
-and solves for the moduli at every trial (`fitting.separable`); the chord steps at the end of a probing's fit keep one
+The first serves fits of material tests, the second fits of probings, the third refits of a diagnosis. Three ways of
+making a misfit small are no descents of this kind and stay beside it: variable projection wraps `trust_region` and
+solves for the moduli at every trial (`fitting.separable`); the chord steps at the end of a probing's fit keep one
 Jacobian while the simulation changes (`fitting.closing`); Adam and L-BFGS know first derivatives only
 (`fitting.gradient_descent`).
 
@@ -31,7 +32,7 @@ from tissuejax.estimation.posed import LeastSquares, half_square
 from tissuejax.estimation.reach import Reach
 from tissuejax.estimation.rules import Damping, Proposal, Rule, sizes
 
-Heard = Callable[[int, float, Float[np.ndarray, " p"]], None]
+OnAccept = Callable[[int, float, Float[np.ndarray, " p"]], None]
 
 
 @dataclass(frozen=True)
@@ -88,11 +89,13 @@ class Ended:
         return f"{self.ending} after {self.runs} evaluations" if self.ending is Ending.SPENT else str(self.ending)
 
 
-def descend(problem: LeastSquares, y: Float[np.ndarray, " p"], method: Method, heard: Heard | None = None) -> Ended:
+def descend(
+    problem: LeastSquares, y: Float[np.ndarray, " p"], method: Method, on_accept: OnAccept | None = None
+) -> Ended:
     """Make the residuals of `problem` small from `y`.
 
     Args:
-        heard: told of every accepted point, the start included: residuals computed so far, cost, and the point.
+        on_accept: called with residuals computed so far, cost and point of every accepted point, the start included.
 
     Raises:
         UnstableSimulation: the start itself can't be simulated.
@@ -109,20 +112,20 @@ def descend(problem: LeastSquares, y: Float[np.ndarray, " p"], method: Method, h
     def arrived() -> None:
         if not trace or trace[-1][1] is not y:
             trace.append((cost, y))
-            if heard is not None:
-                heard(runs, cost, y)
+            if on_accept is not None:
+                on_accept(runs, cost, y)
 
     if not np.isfinite(cost):
         return ended(Ending.NO_PREDICTION)
     for _ in range(method.points):
         arrived()
-        jacobian, told = source.at(y, reach.scale)
+        jacobian, seen = source.at(y, reach.scale)
         if not np.isfinite(jacobian).all():
             return ended(Ending.NO_DERIVATIVE)
         size = sizes(jacobian, reach.scale) if size is None or not damping.of_start else size
         if why := rule.here(cost, r, jacobian, size):
             return ended(why)
-        q, triangle = np.linalg.qr(told)
+        q, triangle = np.linalg.qr(seen)
         aim, taken = -(q.T @ r), False
         for attempt in range(method.tries):
             trial = reach.trial(triangle, aim, np.sqrt(held) * size, y, attempt)

@@ -18,12 +18,12 @@ EAGER = Damping(1e-3, 0.0, trusted=None, falls=10.0, least=1e-9, doubted=1.0, ri
 ALL = 10**6
 
 
-def exact(p: int, runs: int = 200, tolerance: float = 1e-9, to_beat: float = np.inf) -> Method:
+def trust_region(p: int, runs: int = 200, tolerance: float = 1e-9, to_beat: float = np.inf) -> Method:
     """Of predictions whose derivatives come with them at little cost, in p coordinates of order one without bounds."""
     return Method(Exact, Reach.anywhere(p), TRUSTED, Precise(tolerance, runs, to_beat), ALL, ALL)
 
 
-def sparing(p: int, points: int = 20, fraction: float = 0.1, last: float = 0.5, longest: float = 1.0) -> Method:
+def marquardt(p: int, points: int = 20, fraction: float = 0.1, last: float = 0.5, longest: float = 1.0) -> Method:
     """Of predictions that cost a simulation, in p coordinates of order one (logarithms, scaled parameters).
 
     A trial costs a forward run; a Jacobian (five times as much) follows only once the point is better.
@@ -31,7 +31,7 @@ def sparing(p: int, points: int = 20, fraction: float = 0.1, last: float = 0.5, 
     return Method(Exact, Reach.anywhere(p, longest), SPARED, InErrors(fraction, last), points, 8)
 
 
-def corrected(
+def broyden(
     reach: Reach,
     points: int,
     tolerance: float,

@@ -12,7 +12,7 @@ import numpy as np
 import optax
 from jaxtyping import Float
 
-from tissuejax.estimation.descent import Ended, Heard
+from tissuejax.estimation.descent import Ended, OnAccept
 from tissuejax.estimation.ending import Ending
 from tissuejax.estimation.problem import Problem
 from tissuejax.estimation.transforms import FAR
@@ -74,7 +74,7 @@ def gradient_descent(
     *,
     max_steps: int,
     tolerance: float,
-    on_accept: Heard | None = None,
+    on_accept: OnAccept | None = None,
 ) -> Ended:
     """Minimise by "adam" (ten times `max_steps` steps) or "lbfgs" from the free variables `y`."""
     loss = objective(problem)

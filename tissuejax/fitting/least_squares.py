@@ -18,7 +18,7 @@ from tissuejax.estimation.covariance import Uncertainty, uncertainty
 from tissuejax.estimation.descent import Ended
 from tissuejax.estimation.descent import descend as minimised
 from tissuejax.estimation.losses import soften
-from tissuejax.estimation.methods import exact
+from tissuejax.estimation.methods import trust_region
 from tissuejax.estimation.posed import LeastSquares, half_square
 from tissuejax.estimation.problem import Problem
 from tissuejax.estimation.sigma import sigmas
@@ -65,21 +65,21 @@ def descend(
     """
     x = problem.vector(start if start is not None else problem.start)
     if method == "levenberg-marquardt" and separable(problem):
-        heard = None if on_accept is None else lambda n, cost, x: on_accept(n, 2 * cost, problem.values(x))
+        accepted = None if on_accept is None else lambda n, cost, x: on_accept(n, 2 * cost, problem.values(x))
         options = {"max_steps": max_steps, "tolerance": tolerance, "to_beat": to_beat}
         with suppress(NotSeparable):
-            return projected_descent(problem, x, on_accept=heard, **options)
+            return projected_descent(problem, x, on_accept=accepted, **options)
     box = problem.box
     y = box.free(x)
 
     def report(n, cost, y):
         on_accept(n, 2 * cost, problem.values(box.bounded(y)[0]))
 
-    heard = report if on_accept is not None else None
+    accepted = report if on_accept is not None else None
     if method == "levenberg-marquardt":
-        found = minimised(InBox(problem), y, exact(len(y), max_steps, tolerance, to_beat), heard)
+        found = minimised(InBox(problem), y, trust_region(len(y), max_steps, tolerance, to_beat), accepted)
     elif method in GRADIENT_METHODS:
-        found = gradient_descent(problem, y, method, max_steps=max_steps, tolerance=tolerance, on_accept=heard)
+        found = gradient_descent(problem, y, method, max_steps=max_steps, tolerance=tolerance, on_accept=accepted)
     else:
         raise InputError(f"unknown method {method!r}; one of {', '.join(METHODS)}")
     trace = [(cost, box.bounded(y)[0]) for cost, y in found.trace]

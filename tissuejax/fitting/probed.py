@@ -18,7 +18,7 @@ from tissuejax.errors import InputError
 from tissuejax.estimation.covariance import Uncertainty, uncertainty
 from tissuejax.estimation.descent import Ended, descend
 from tissuejax.estimation.ending import Ending
-from tissuejax.estimation.methods import sparing
+from tissuejax.estimation.methods import marquardt
 from tissuejax.estimation.numerical import changes
 from tissuejax.estimation.numerical import shifts as numerical_shifts
 from tissuejax.estimation.posed import LeastSquares, half_square
@@ -113,7 +113,7 @@ def fit_probed(
             J = chained(runs.better(x), slope)
             descent = Ended(y, half_square(r), Ending.CONVERGED, r, J, 0, 0)
         else:
-            descent = descend(runs, y, sparing(len(y), max_steps, fraction, LAST), runs.accepted)
+            descent = descend(runs, y, marquardt(len(y), max_steps, fraction, LAST), runs.accepted)
         x, slope = problem.box.bounded(descent.y)
         J = unchained(descent.jacobian, slope)
         kept.keep(problem.values(x), closing=True)

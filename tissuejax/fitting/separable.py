@@ -14,9 +14,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import lsq_linear
 
-from tissuejax.estimation.descent import Ended, Heard, descend
+from tissuejax.estimation.descent import Ended, OnAccept, descend
 from tissuejax.estimation.ending import Ending
-from tissuejax.estimation.methods import exact
+from tissuejax.estimation.methods import trust_region
 from tissuejax.estimation.posed import LeastSquares, half_square
 from tissuejax.estimation.problem import Problem
 from tissuejax.estimation.transforms import Box, chained
@@ -115,7 +115,7 @@ def projected_descent(
     *,
     max_steps: int,
     tolerance: float,
-    on_accept: Heard | None,
+    on_accept: OnAccept | None,
     to_beat: float,
 ) -> Ended:
     """Minimise from the free parameters `x` (not transformed); `Ended.y` are free parameters too.
@@ -133,11 +133,11 @@ def projected_descent(
             on_accept(projection.n, cost, end)
         return Ended(end, cost, why, r, np.zeros((len(r), 0)), projection.n, 0, [(cost, end)] if good else [])
 
-    def heard(_, cost, y):
+    def accepted(_, cost, y):
         on_accept(projection.n, cost, projection.points[y.tobytes()])
 
-    method = exact(len(y), max(1, max_steps // 2), tolerance, to_beat)
-    found = descend(projection, y, method, heard if on_accept is not None else None)
+    method = trust_region(len(y), max(1, max_steps // 2), tolerance, to_beat)
+    found = descend(projection, y, method, accepted if on_accept is not None else None)
     if not found.trace:
         return replace(found, y=x, runs=projection.n)
     trace = [(cost, projection.points[y.tobytes()]) for cost, y in found.trace]

@@ -1,11 +1,11 @@
-"""The sparing descent: the answer with few Jacobians, and rejected steps cost a forward run."""
+"""Marquardt's descent, few simulations: the answer with few Jacobians, and rejected steps cost a forward run."""
 
 import numpy as np
 import pytest
 
 from tissuejax.errors import UnstableSimulation
 from tissuejax.estimation.descent import descend
-from tissuejax.estimation.methods import sparing
+from tissuejax.estimation.methods import marquardt
 from tissuejax.estimation.posed import LeastSquares
 
 T = np.linspace(0, 3, 200)
@@ -35,8 +35,8 @@ class Posed(LeastSquares):
         return self.derivative(y)
 
 
-def sparingly(derivative, residuals, y):
-    return descend(Posed(derivative, residuals), y, sparing(len(y)))
+def descended(derivative, residuals, y):
+    return descend(Posed(derivative, residuals), y, marquardt(len(y)))
 
 
 @pytest.mark.parametrize("start", [(4.0, 0.5), (0.3, 6.0)])
@@ -52,7 +52,7 @@ def test_finds_the_answer_with_few_jacobians(rng, start):
         calls["jacobian"] += 1
         return jacobian(y) / 0.01
 
-    out = sparingly(derivative, residuals, np.log(start))
+    out = descended(derivative, residuals, np.log(start))
     assert np.array_equal(out.residuals, residuals(out.y))
     assert out.jacobian.shape == (T.size, 2)
     J = jacobian(TRUTH) / 0.01
@@ -71,12 +71,12 @@ def test_unstable_trials_are_rejected_not_masked(rng):
             raise UnstableSimulation("blew up")
         return (model(y) - data) / 0.01
 
-    out = sparingly(lambda y: jacobian(y) / 0.01, residuals, np.log([4.0, 0.4]))
+    out = descended(lambda y: jacobian(y) / 0.01, residuals, np.log([4.0, 0.4]))
     assert out.converged
     assert np.abs(out.y - TRUTH).max() < 0.05
 
 
 def test_a_start_without_prediction_says_so():
-    out = sparingly(lambda y: np.ones((3, 1)), lambda y: np.full(3, np.nan), np.zeros(1))
+    out = descended(lambda y: np.ones((3, 1)), lambda y: np.full(3, np.nan), np.zeros(1))
     assert not out.converged
     assert "no finite prediction" in out.reason
