@@ -28,10 +28,16 @@ types: $(STAMP)
 # half the time and that runs half as fast; `make test QUICK=` and `make slow` compile as users do.
 QUICK ?= --xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=2
 
+# Tests of the lower floors, whose shapes and types are checked while they run (tests/conftest.py).
+SHAPED := tests/contracts/test_energies.py tests/contracts/test_elements.py tests/contracts/test_cohesion.py \
+    tests/analytic/test_tensors.py
+PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 XLA_FLAGS="$(QUICK)" COVERAGE_FILE=out/.coverage \
+    $(BIN)/python -m pytest -n 2 --dist loadfile -q --cov=tissuejax --cov-report=
+
 test: lint types docs
 	mkdir -p out
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 XLA_FLAGS="$(QUICK)" COVERAGE_FILE=out/.coverage \
-	    $(BIN)/python -m pytest -n 2 --dist loadfile -q --durations=15 --cov=tissuejax --cov-report=
+	TISSUEJAX_SHAPES=on $(PYTEST) $(SHAPED)
+	$(PYTEST) --cov-append --durations=15 $(SHAPED:%=--ignore=%)
 	COVERAGE_FILE=out/.coverage $(BIN)/coverage report --sort=cover | awk 'NR < 18 || /^TOTAL/'
 
 slow: $(STAMP)

@@ -9,6 +9,13 @@ import jax
 import numpy as np
 import pytest
 from hypothesis import settings
+from jaxtyping import install_import_hook
+
+# Shapes and types of the lower floors, checked while their own tests run (`make test`, or TISSUEJAX_SHAPES=on pytest);
+# the hook comes before anything of them is imported.
+CHECKED = ("tensors", "spectral", "parameters", "energies", "elements", "cohesion")
+if os.environ.get("TISSUEJAX_SHAPES") == "on":
+    install_import_hook([f"tissuejax.{room}" for room in CHECKED], "beartype.beartype")
 
 jax.config.update("jax_enable_x64", True)
 # No timed assertions in the suite, and the same examples everywhere.

@@ -7,12 +7,16 @@ path (`energy.mu`, `effects.friction.coefficient`) to a scalar, which is a JAX p
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 from jaxtyping import Array, Float
 
+from tissuejax.arrays import Either
 from tissuejax.errors import InputError, unknown
 
-Values = dict[str, Float[Array, ""]]
+Values = Mapping[str, Float[Array, ""] | float]
+Number = TypeVar("Number")
+Constants = Mapping[str, Either]  # of a law, by name
 
 
 @dataclass(frozen=True)
@@ -56,7 +60,7 @@ def prefixed(prefix: str, declared: Mapping[str, Parameter] | tuple[Parameter, .
     return {f"{prefix}.{name}": parameter for name, parameter in pairs}
 
 
-def under(prefix: str, values: Mapping[str, Array]) -> dict[str, Array]:
+def under(prefix: str, values: Mapping[str, Number]) -> dict[str, Number]:
     """The values below `prefix`, by the rest of their path."""
     start = f"{prefix}."
     return {path[len(start) :]: value for path, value in values.items() if path.startswith(start)}

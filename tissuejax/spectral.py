@@ -21,14 +21,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.custom_derivatives import SymbolicZero
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.tensors import Sym, double_dot, total
 
 SWEEPS = 4  # quadratic convergence: 4 reach float64 round-off (tests, also at widely spread eigenvalues)
 CLOSE = 0.1  # below this spread of ln(eigenvalue) second divided differences are integrated
 UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # order of the components of Sym
-Vector = tuple[Array, Array, Array]
+Vector = tuple[Either, Either, Either]
 
 
 def eigensystem(C: Sym) -> tuple[Vector, tuple[Vector, Vector, Vector]]:
@@ -36,20 +37,20 @@ def eigensystem(C: Sym) -> tuple[Vector, tuple[Vector, Vector, Vector]]:
     return _eigensystem(Sym(*jnp.broadcast_arrays(*C)))
 
 
-def power_sums(C: Sym, alphas: tuple[Float[Array, "..."], ...]) -> tuple[Float[Array, "..."], ...]:
+def power_sums(C: Sym, alphas: tuple[Float[Either, "..."], ...]) -> tuple[Float[Either, "..."], ...]:
     """sum_i l_i^alpha for each alpha, l_i^2 the eigenvalues of C (l_i: principal stretches); it is tr C^(alpha/2)."""
     C, s = _prepared(C, alphas)
     return tuple(_traces(0, C, 0.5 * s))
 
 
-def powers(C: Sym, exponents: tuple[Float[Array, "..."], ...]) -> tuple[Sym, ...]:
+def powers(C: Sym, exponents: tuple[Float[Either, "..."], ...]) -> tuple[Sym, ...]:
     """C^s for each exponent s (any real, traced or not) of a positive definite symmetric tensor."""
     C, s = _prepared(C, exponents)
     together = _powers(0, C, s)
     return tuple(Sym(*(c[k] for c in together)) for k in range(len(exponents)))
 
 
-def _prepared(C: Sym, exponents: tuple[Array, ...]) -> tuple[Sym, Array]:
+def _prepared(C: Sym, exponents: tuple[Either, ...]) -> tuple[Sym, Either]:
     """One dtype and shape for the components, and the exponents along a new first axis (less for the compiler)."""
     kind = jnp.result_type(*C, *exponents, float)
     C = Sym(*jnp.broadcast_arrays(*(jnp.asarray(c, dtype=kind) for c in C)))
@@ -63,13 +64,13 @@ def _prepared(C: Sym, exponents: tuple[Array, ...]) -> tuple[Sym, Array]:
 # C has components of shape `...`, s has shape `k ...` (or `k 1...`): results have the axis of exponents first.
 
 
-def _f(m: int, s: Array, x: Array) -> Array:
+def _f(m: int, s: Either, x: Either) -> Either:
     log = jnp.log(x)
     return jnp.exp(s * log) * log**m if m else jnp.exp(s * log)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _traces(m: int, C: Sym, s: Float[Array, "k ..."]) -> Float[Array, "k ..."]:
+def _traces(m: int, C: Sym, s: Float[Either, "k ..."]) -> Float[Either, "k ..."]:
     """tr C^s ln(C)^m."""
     values, _ = _eigensystem(C)
     return total(_f(m, s, x) for x in values)
@@ -91,7 +92,7 @@ def _traces_jvp(m, primals, tangents):
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _powers(m: int, C: Sym, s: Float[Array, "k ..."]) -> Sym:
+def _powers(m: int, C: Sym, s: Float[Either, "k ..."]) -> Sym:
     """C^s ln(C)^m."""
     values, vectors = _eigensystem(C)
     return _assemble(vectors, {(i, i): _f(m, s, x) for i, x in enumerate(values)})
@@ -109,7 +110,7 @@ def _powers_jvp(m, primals, tangents):
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _derivative(m: int, C: Sym, s: Float[Array, "k ..."], H: Sym) -> Sym:
+def _derivative(m: int, C: Sym, s: Float[Either, "k ..."], H: Sym) -> Sym:
     """Derivative of C^s ln(C)^m in the direction H (Daleckii and Krein)."""
     values, vectors = _eigensystem(C)
     h = _in_eigenframe(vectors, H)
@@ -130,7 +131,7 @@ def _derivative_jvp(m, primals, tangents):
     return value, out
 
 
-def _second_derivative(m: int, C: Sym, s: Float[Array, "k ..."], H: Sym, K: Sym) -> Sym:
+def _second_derivative(m: int, C: Sym, s: Float[Either, "k ..."], H: Sym, K: Sym) -> Sym:
     """Second derivative of C^s ln(C)^m in the directions H and K."""
     values, vectors = _eigensystem(C)
     h, k = _in_eigenframe(vectors, H), _in_eigenframe(vectors, K)
@@ -146,14 +147,14 @@ def _second_derivative(m: int, C: Sym, s: Float[Array, "k ..."], H: Sym, K: Sym)
 # --- divided differences ----------------------------------------------------------------------------------------------
 
 
-def _phi(u: Array) -> Array:
+def _phi(u: Either) -> Either:
     """expm1(u) / u, with value and derivatives right at u = 0."""
     near = jnp.abs(u) < 1e-3
     safe = jnp.where(near, 1.0, u)
     return jnp.where(near, 1 + u / 2 * (1 + u / 3 * (1 + u / 4 * (1 + u / 5))), jnp.expm1(safe) / safe)
 
 
-def _first(m: int, s: Array, x: Array, y: Array) -> Array:
+def _first(m: int, s: Either, x: Either, y: Either) -> Either:
     """f[x, y] = (f(x) - f(y)) / (x - y), f'(x) at x = y, without cancellation."""
     log_x, log_y = jnp.log(x), jnp.log(y)
     u = log_x - log_y
@@ -170,7 +171,7 @@ _A, _B = (g.ravel() for g in np.meshgrid(_G + 0.5, _G + 0.5, indexing="ij"))
 _WEIGHTS = np.outer(_W, _W).ravel() * _A
 
 
-def _second(m: int, s: Array, x: Array, y: Array, z: Array) -> Array:
+def _second(m: int, s: Either, x: Either, y: Either, z: Either) -> Either:
     """f[x, y, z]: by the recurrence on the two that are farthest apart, by its integral where all three are close."""
     low, high = jnp.minimum(jnp.minimum(x, y), z), jnp.maximum(jnp.maximum(x, y), z)
     middle = jnp.maximum(jnp.minimum(x, y), jnp.minimum(jnp.maximum(x, y), z))
@@ -183,7 +184,7 @@ def _second(m: int, s: Array, x: Array, y: Array, z: Array) -> Array:
     return jnp.where(close, integral, apart)
 
 
-def _curvature(m: int, s: Array, x: Array) -> Array:
+def _curvature(m: int, s: Either, x: Either) -> Either:
     """f''(x)."""
     curvature = s * (s - 1) * _f(m, s - 2, x)
     if m >= 1:
@@ -237,7 +238,7 @@ def _tangent(d: Sym) -> tuple[Sym, bool]:
     return Sym(*(jnp.zeros(x.shape, x.dtype) if isinstance(x, SymbolicZero) else x for x in d)), some
 
 
-def _added(A: Sym, B: Sym, factor: Array | float = 1.0) -> Sym:
+def _added(A: Sym, B: Sym, factor: Either | float = 1.0) -> Sym:
     return Sym(*(a + b * factor for a, b in zip(A, B)))
 
 
@@ -246,10 +247,10 @@ def _ordered(i: int, j: int, k: int) -> tuple[int, int, int]:
     return a, b, c
 
 
-def _assemble(v: tuple[Vector, ...], frame: dict[tuple[int, int], Array]) -> Sym:
+def _assemble(v: tuple[Vector, ...], frame: dict[tuple[int, int], Either]) -> Sym:
     """sum_ij frame_ij v_i v_j^T, frame given by its upper triangle (absent entries are zero)."""
 
-    def entry(k: int, l: int) -> Array:
+    def entry(k: int, l: int) -> Either:
         return total(
             x * (v[i][k] * v[i][l] if i == j else v[i][k] * v[j][l] + v[j][k] * v[i][l]) for (i, j), x in frame.items()
         )
@@ -257,7 +258,7 @@ def _assemble(v: tuple[Vector, ...], frame: dict[tuple[int, int], Array]) -> Sym
     return Sym(*(entry(k, l) for k, l in UPPER))
 
 
-def _in_eigenframe(v: tuple[Vector, ...], H: Sym) -> dict[tuple[int, int], Array]:
+def _in_eigenframe(v: tuple[Vector, ...], H: Sym) -> dict[tuple[int, int], Either]:
     """v_i . H v_j for all i, j."""
     rows = ((H.xx, H.xy, H.xz), (H.xy, H.yy, H.yz), (H.xz, H.yz, H.zz))
     Hv = [tuple(sum(h * x for h, x in zip(row, vj)) for row in rows) for vj in v]

@@ -122,6 +122,6 @@ def quantity(text: str | float, si: str, what: str = "value") -> float:
     if unit.strip() == "1" and si != "1":
         raise InputError(f'{what} = {text!r} has no unit: write a number and a unit, such as "{number:g} {si}"')
     try:
-        return to_si(number, unit, si)
+        return float(to_si(number, unit, si))
     except InputError as error:
         raise InputError(f"{what} = {text!r}: {error}") from error

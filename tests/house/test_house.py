@@ -18,7 +18,7 @@ from tests.conftest import outside
 ROOT = Path(tissuejax.__file__).parent
 PROJECT = ROOT.parent
 FLOORS = [
-    {"errors", "families", "parameters", "tensors", "spectral", "units", "progress", "storage", "cache"},
+    {"arrays", "errors", "families", "parameters", "tensors", "spectral", "units", "progress", "storage", "cache"},
     {"energies"},
     {"recordings"},
     {"mesh"},

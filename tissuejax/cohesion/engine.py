@@ -7,23 +7,24 @@ opening and sliding take. Over a step from d_a to d_b that is d_a d_b (k_a - k_b
 Neutral: an infinite energy never softens; the face stays an elastic layer of stiffness K.
 """
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.cohesion.law import Law
 from tissuejax.cohesion.mixity import mixed
+from tissuejax.parameters import Constants
 
-Vector = tuple[Float[Array, "..."], Float[Array, "..."], Float[Array, "..."]]
+Vector = tuple[Float[Either, "..."], Float[Either, "..."], Float[Either, "..."]]
 
 
 class Memory(NamedTuple):
     """Secant stiffness now (Pa/m) and the opening at which it was last lowered (m), at each point."""
 
-    secant: Float[Array, "q P"]
-    reached: Float[Array, "q P"]
+    secant: Float[Either, "q P"]
+    reached: Float[Either, "q P"]
 
 
 class Pull(NamedTuple):
@@ -31,10 +32,10 @@ class Pull(NamedTuple):
 
     traction: Vector
     memory: Memory
-    lost: Float[Array, "q P"]
+    lost: Float[Either, "q P"]
 
 
-def whole(law: Law, p: Mapping[str, Array], K: Float[Array, "..."], like: Float[Array, "q P"]) -> Memory:
+def whole(law: Law, p: Constants, K: Float[Either, "..."], like: Float[Either, "q P"]) -> Memory:
     """Memory of faces that have never been opened."""
     one = jnp.ones_like(like)
     return Memory(one * _unbroken(law, p, K), 0.0 * one)
@@ -48,9 +49,9 @@ def _unbroken(law, p, K):
 
 def pull(
     law: Law,
-    p: Mapping[str, Array],
-    K: Float[Array, "..."],
-    contact: Float[Array, "..."],
+    p: Constants,
+    K: Float[Either, "..."],
+    contact: Float[Either, "..."],
     gap: Vector,
     normal: Vector,
     memory: Memory,
@@ -80,13 +81,13 @@ def pull(
     before, after = jnp.maximum(memory.reached, law.onset(now, K)), jnp.minimum(opening, last)
     lost = jnp.where(lowered, 0.5 * before * after * (memory.secant - secant), 0.0)
     reached = jnp.where(lowered, opening, memory.reached)
-    traction = tuple(-(secant * f + contact * shut * n) for f, n in zip(free, normal, strict=True))
-    return Pull(traction, Memory(secant, reached), lost)
+    x, y, z = (-(secant * f + contact * shut * n) for f, n in zip(free, normal, strict=True))
+    return Pull((x, y, z), Memory(secant, reached), lost)
 
 
 def stored(
-    secant: Float[Array, "..."], contact: Float[Array, "..."], gap: Vector, normal: Vector
-) -> Float[Array, "..."]:
+    secant: Float[Either, "..."], contact: Float[Either, "..."], gap: Vector, normal: Vector
+) -> Float[Either, "..."]:
     """Energy stored in the pull and in closing gaps, J/m^2."""
     across = sum(g * n for g, n in zip(gap, normal, strict=True))
     shut = jnp.minimum(across, 0.0)

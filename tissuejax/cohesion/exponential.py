@@ -1,12 +1,13 @@
 """Exponential: smooth from the first opening on, with a long tail."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.cohesion.law import Law
+from tissuejax.parameters import Constants
 
 TAIL = 6.638352  # (1 + x) exp(-x) = 0.01: by then 99 % of the energy is spent
 
@@ -22,22 +23,20 @@ class Exponential(Law):
     formula: ClassVar[str] = "tau (d/d0) exp(1 - d/d0), d0 = G / (e tau)"
     source: ClassVar[str] = "Lister 2012, fig. 3.2; Xu & Needleman 1993, Modelling Simul. Mater. Sci. Eng. 1"
 
-    def initial(self, p: Mapping[str, Array], K: Float[Array, "..."]) -> Float[Array, "..."]:
+    def initial(self, p: Constants, K: Float[Either, "..."]) -> Float[Either, "..."]:
         return self.secant(p, K, jnp.zeros_like(K))
 
-    def onset(self, p: Mapping[str, Array], K: Float[Array, "..."]) -> Float[Array, "..."]:
+    def onset(self, p: Constants, K: Float[Either, "..."]) -> Float[Either, "..."]:
         return 0.0 * self._peak(p)
 
-    def end(self, p: Mapping[str, Array], K: Float[Array, "..."]) -> Float[Array, "..."]:
+    def end(self, p: Constants, K: Float[Either, "..."]) -> Float[Either, "..."]:
         return TAIL * self._peak(p)
 
-    def secant(
-        self, p: Mapping[str, Array], K: Float[Array, "..."], opening: Float[Array, "..."]
-    ) -> Float[Array, "..."]:
+    def secant(self, p: Constants, K: Float[Either, "..."], opening: Float[Either, "..."]) -> Float[Either, "..."]:
         peak = self._peak(p)
         return p["strength"] / peak * jnp.exp(1 - opening / peak)
 
-    def work(self, p: Mapping[str, Array], K: Float[Array, "..."], opening: Float[Array, "..."]) -> Float[Array, "..."]:
+    def work(self, p: Constants, K: Float[Either, "..."], opening: Float[Either, "..."]) -> Float[Either, "..."]:
         x = opening / self._peak(p)
         return p["energy"] * (1 - (1 + x) * jnp.exp(-x))
 

@@ -7,13 +7,13 @@ Source: Lister 2012, 3.1.1 (three parameters, two of which suffice); the irrever
 """
 
 import abc
-from collections.abc import Mapping
 from typing import ClassVar
 
 import equinox as eqx
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from tissuejax.parameters import Parameter
+from tissuejax.arrays import Either
+from tissuejax.parameters import Constants, Parameter
 
 STRENGTH = Parameter("strength", "Pa", 4000.0, lower=0.0, meaning="greatest traction before a face parts", scale=1000.0)
 ENERGY = Parameter("energy", "J/m^2", 2.0, lower=0.0, meaning="toughness: energy lost per area parted", scale=1.0)
@@ -43,23 +43,21 @@ class Law(eqx.Module):
         return STRENGTH, ENERGY, Parameter("shape", "1", default, 0.0, 1.0, meaning, frozen=True)
 
     @abc.abstractmethod
-    def initial(self, p: Mapping[str, Array], K: Float[Array, "..."]) -> Float[Array, "..."]:
+    def initial(self, p: Constants, K: Float[Either, "..."]) -> Float[Either, "..."]:
         """Stiffness of an unopened face, Pa/m; K is the mesh's."""
 
     @abc.abstractmethod
-    def onset(self, p: Mapping[str, Array], K: Float[Array, "..."]) -> Float[Array, "..."]:
+    def onset(self, p: Constants, K: Float[Either, "..."]) -> Float[Either, "..."]:
         """Opening up to which nothing is lost, m."""
 
     @abc.abstractmethod
-    def end(self, p: Mapping[str, Array], K: Float[Array, "..."]) -> Float[Array, "..."]:
+    def end(self, p: Constants, K: Float[Either, "..."]) -> Float[Either, "..."]:
         """Opening at which a face counts as parted, m: nothing is carried beyond, or less than 1 % of G is left."""
 
     @abc.abstractmethod
-    def secant(
-        self, p: Mapping[str, Array], K: Float[Array, "..."], opening: Float[Array, "..."]
-    ) -> Float[Array, "..."]:
+    def secant(self, p: Constants, K: Float[Either, "..."], opening: Float[Either, "..."]) -> Float[Either, "..."]:
         """T(d) / d on the envelope, Pa/m; finite at d = 0, never rising with d."""
 
     @abc.abstractmethod
-    def work(self, p: Mapping[str, Array], K: Float[Array, "..."], opening: Float[Array, "..."]) -> Float[Array, "..."]:
+    def work(self, p: Constants, K: Float[Either, "..."], opening: Float[Either, "..."]) -> Float[Either, "..."]:
         """Area under the envelope from 0 to d, J/m^2."""

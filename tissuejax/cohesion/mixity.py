@@ -5,12 +5,12 @@ G = G_I + (G_II - G_I) B^eta, B the share of sliding. With one stiffness for bot
 d_s^2 / (d_n^2 + d_s^2) along a straight path of opening (Turon et al. 2006, Mech. Mater. 38).
 """
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from tissuejax.parameters import Parameter
+from tissuejax.arrays import Either
+from tissuejax.parameters import Constants, Parameter
 
 PARAMETERS = (
     Parameter("shear_strength", "1", 1.0, 1e-3, 1e3, "strength in sliding over that in opening", frozen=True),
@@ -22,11 +22,11 @@ PARAMETERS = (
 class Mixed(NamedTuple):
     """Strength, Pa, and energy, J/m^2, at a share of sliding."""
 
-    strength: Float[Array, "..."]
-    energy: Float[Array, "..."]
+    strength: Float[Either, "..."]
+    energy: Float[Either, "..."]
 
 
-def mixed(p: Mapping[str, Array], sliding: Float[Array, "..."]) -> Mixed:
+def mixed(p: Constants, sliding: Float[Either, "..."]) -> Mixed:
     """Strength and energy with `sliding` = B in [0, 1]; ratios left out are 1 (no difference)."""
     strength, energy = p["strength"], p["energy"]
     if "shear_strength" in p:

@@ -1,12 +1,13 @@
 """Trapezoidal: the strength is held over a plateau before it falls, as in tissue that yields."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.cohesion.law import Law
+from tissuejax.parameters import Constants
 
 
 class Trapezoidal(Law):
@@ -20,24 +21,22 @@ class Trapezoidal(Law):
     source: ClassVar[str] = "Lister 2012, fig. 3.2; Tvergaard & Hutchinson 1992, J. Mech. Phys. Solids 40"
     shaped: ClassVar[tuple[str, float] | None] = ("where the plateau ends, over the opening at the end", 0.5)
 
-    def initial(self, p: Mapping[str, Array], K: Float[Array, "..."]) -> Float[Array, "..."]:
+    def initial(self, p: Constants, K: Float[Either, "..."]) -> Float[Either, "..."]:
         return K
 
-    def onset(self, p: Mapping[str, Array], K: Float[Array, "..."]) -> Float[Array, "..."]:
+    def onset(self, p: Constants, K: Float[Either, "..."]) -> Float[Either, "..."]:
         return p["strength"] / K
 
-    def end(self, p: Mapping[str, Array], K: Float[Array, "..."]) -> Float[Array, "..."]:
+    def end(self, p: Constants, K: Float[Either, "..."]) -> Float[Either, "..."]:
         return (2 * p["energy"] / p["strength"] + self.onset(p, K)) / (1 + p["shape"])
 
-    def secant(
-        self, p: Mapping[str, Array], K: Float[Array, "..."], opening: Float[Array, "..."]
-    ) -> Float[Array, "..."]:
+    def secant(self, p: Constants, K: Float[Either, "..."], opening: Float[Either, "..."]) -> Float[Either, "..."]:
         first, last = self.onset(p, K), self.end(p, K)
         beyond = jnp.maximum(opening, first)
         fall = jnp.clip((last - beyond) / (last * (1 - p["shape"])), 0.0, 1.0)
         return jnp.where(opening <= first, K, p["strength"] * fall / beyond)
 
-    def work(self, p: Mapping[str, Array], K: Float[Array, "..."], opening: Float[Array, "..."]) -> Float[Array, "..."]:
+    def work(self, p: Constants, K: Float[Either, "..."], opening: Float[Either, "..."]) -> Float[Either, "..."]:
         first, last = self.onset(p, K), self.end(p, K)
         turn = p["shape"] * last
         left = jnp.clip(last - opening, 0.0, last - turn)

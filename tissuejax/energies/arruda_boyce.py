@@ -1,13 +1,13 @@
 """Arruda-Boyce: eight chains of limited length, as the usual five-term series."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.strain import Strain
-from tissuejax.parameters import Parameter
+from tissuejax.parameters import Constants, Parameter
 
 # Series of the inverse Langevin function, Arruda and Boyce 1993, eq. 27.
 COEFFICIENTS = (1 / 2, 1 / 20, 11 / 1050, 19 / 7000, 519 / 673750)
@@ -32,7 +32,7 @@ class ArrudaBoyce(Energy):
             Parameter("lambda_m", "1", 3.0, lower=1.0, upper=100.0, meaning="chain stretch at which they are straight"),
         )
 
-    def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def isochoric(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         n, I1 = p["lambda_m"] ** -2, strain.I1
         # I1^i - 3^i = (I1 - 3) q_i with q_i = I1 q_(i-1) + 3^(i-1): exactly zero at rest.
         q, total = 1.0, 0.0
@@ -41,6 +41,6 @@ class ArrudaBoyce(Energy):
             total = total + c * n**i * q
         return p["mu"] * (I1 - 3) * total
 
-    def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def initial_shear_modulus(self, p: Constants) -> Float[Either, ""]:
         n = p["lambda_m"] ** -2
         return p["mu"] * (1 + n * (3 / 5 + n * (99 / 175 + n * (513 / 875 + n * 42039 / 67375))))

@@ -1,14 +1,14 @@
 """Demiray: exponential stiffening of soft tissue, one exponent."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.barrier import expm1
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.strain import Strain
-from tissuejax.parameters import Parameter
+from tissuejax.parameters import Constants, Parameter
 
 
 class Demiray(Energy):
@@ -30,8 +30,8 @@ class Demiray(Energy):
             Parameter("b", "1", 1.0, lower=0.0, upper=1e3, meaning="stiffening"),
         )
 
-    def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def isochoric(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         return 0.5 * p["mu"] / p["b"] * expm1(p["b"] * (strain.I1 - 3))
 
-    def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def initial_shear_modulus(self, p: Constants) -> Float[Either, ""]:
         return p["mu"]

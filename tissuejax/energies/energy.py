@@ -1,14 +1,14 @@
 """What every strain energy is: parameters as data and one function, the energy itself."""
 
 import abc
-from collections.abc import Mapping
 from typing import ClassVar
 
 import equinox as eqx
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.strain import Strain
-from tissuejax.parameters import Parameter
+from tissuejax.parameters import Constants, Parameter
 
 
 class Energy(eqx.Module):
@@ -27,13 +27,13 @@ class Energy(eqx.Module):
         """Declared parameters, in order."""
 
     @abc.abstractmethod
-    def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def isochoric(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         """Isochoric energy psi_iso in J/m^3 = Pa; zero at rest."""
 
     @abc.abstractmethod
-    def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def initial_shear_modulus(self, p: Constants) -> Float[Either, ""]:
         """Shear modulus at rest, Pa."""
 
-    def margin(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def margin(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         """Positive inside the valid range of strains; energies that end somewhere say where."""
         return 1.0 + 0.0 * strain.J

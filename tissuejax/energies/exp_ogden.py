@@ -1,14 +1,14 @@
 """Exp-Ogden: one Ogden sum inside an exponential."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.barrier import expm1
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.strain import Strain
-from tissuejax.parameters import Parameter
+from tissuejax.parameters import Constants, Parameter
 
 
 class ExpOgden(Energy):
@@ -31,9 +31,9 @@ class ExpOgden(Energy):
             Parameter("alpha", "1", -2.5, lower=-50.0, upper=50.0, meaning="exponent of the stretches"),
         )
 
-    def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def isochoric(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         (total,) = strain.power_sums((p["alpha"],))
         return p["C1"] * expm1(p["C2"] * (total - 3))
 
-    def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def initial_shear_modulus(self, p: Constants) -> Float[Either, ""]:
         return 0.5 * p["C1"] * p["C2"] * p["alpha"] ** 2

@@ -1,15 +1,15 @@
 """A fibre family that adds to any energy: Holzapfel-Gasser-Ogden, in tension only."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.barrier import expm1
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.strain import Strain
-from tissuejax.parameters import Parameter
+from tissuejax.parameters import Constants, Parameter
 
 ONSET = 1e-3  # of E: over it the fibres take up load; above it the formula is exact
 
@@ -41,28 +41,28 @@ class WithFibre(Energy):
             Parameter("angle", "rad", 0.0, lower=-3.2, upper=3.2, scale=1.0, meaning="direction from axis 1 to 2"),
         )
 
-    def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def isochoric(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         return self.matrix.isochoric(p, strain) + family(p, strain, p["kappa"], p["angle"])
 
-    def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def initial_shear_modulus(self, p: Constants) -> Float[Either, ""]:
         return self.matrix.initial_shear_modulus(p)
 
-    def margin(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def margin(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         return self.matrix.margin(p, strain)
 
-    def angles(self, p: Mapping[str, Array]) -> tuple[Array, ...]:
+    def angles(self, p: Constants) -> tuple[Either, ...]:
         """Direction of each family from axis 1 to 2, rad."""
         return (p["angle"],)
 
 
-def family(p: Mapping[str, Array], strain: Strain, kappa: Array | float, angle: Array) -> Float[Array, "..."]:
+def family(p: Constants, strain: Strain, kappa: Either | float, angle: Either) -> Float[Either, "..."]:
     """Energy of one family, k1/(2 k2) (exp(k2 <E>^2) - 1), Pa, with dispersion `kappa` about `angle`."""
     along = strain.fibre_stretch_squared(jnp.cos(angle), jnp.sin(angle))
     E = kappa * (strain.I1 - 3) + (1 - 3 * kappa) * (along - 1)
     return 0.5 * p["k1"] / p["k2"] * expm1(p["k2"] * _positive(E) ** 2)
 
 
-def _positive(E: Float[Array, "..."]) -> Float[Array, "..."]:
+def _positive(E: Float[Either, "..."]) -> Float[Either, "..."]:
     """0 below 0, E above ONSET; between, a quartic that meets E twice smoothly and keeps W'' positive."""
     onset = E * (1 - (1 - E / ONSET) ** 3)
     return jnp.where(E >= ONSET, E, jnp.where(E > 0, onset, 0.0))

@@ -1,14 +1,14 @@
 """Gent: neo-Hookean chains that run out of length."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.barrier import LIMIT, minus_log
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.strain import Strain
-from tissuejax.parameters import Parameter
+from tissuejax.parameters import Constants, Parameter
 
 
 class Gent(Energy):
@@ -32,11 +32,11 @@ class Gent(Energy):
             Parameter("Jm", "1", 30.0, lower=0.0, meaning="I1bar - 3 at which the chains are straight"),
         )
 
-    def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def isochoric(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         return 0.5 * p["mu"] * p["Jm"] * minus_log(1 - (strain.I1 - 3) / p["Jm"])
 
-    def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def initial_shear_modulus(self, p: Constants) -> Float[Either, ""]:
         return p["mu"]
 
-    def margin(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def margin(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         return 1 - (strain.I1 - 3) / p["Jm"] - LIMIT

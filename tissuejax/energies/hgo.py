@@ -1,15 +1,15 @@
 """Holzapfel-Gasser-Ogden: neo-Hookean with two aligned families of fibres, for arteries."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.fibre import family
 from tissuejax.energies.strain import Strain
 from tissuejax.energies.two_families import DIRECTIONS, REINFORCED, directions
-from tissuejax.parameters import Parameter
+from tissuejax.parameters import Constants, Parameter
 
 
 class HolzapfelGasserOgden(Energy):
@@ -31,13 +31,13 @@ class HolzapfelGasserOgden(Energy):
     def parameters(self) -> tuple[Parameter, ...]:
         return (*REINFORCED, *DIRECTIONS)
 
-    def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def isochoric(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         fibres = sum(family(p, strain, 0.0, angle) for angle in self.angles(p))
         return 0.5 * p["mu"] * (strain.I1 - 3) + fibres
 
-    def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def initial_shear_modulus(self, p: Constants) -> Float[Either, ""]:
         return p["mu"]
 
-    def angles(self, p: Mapping[str, Array]) -> tuple[Array, ...]:
+    def angles(self, p: Constants) -> tuple[Either, ...]:
         """Direction of each family from axis 1 to 2, rad."""
         return directions(p)

@@ -1,14 +1,14 @@
 """Log-Ogden: one Ogden sum inside a logarithm, with an end to the stretch."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.barrier import LIMIT, minus_log
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.strain import Strain
-from tissuejax.parameters import Parameter
+from tissuejax.parameters import Constants, Parameter
 
 
 class LogOgden(Energy):
@@ -32,13 +32,13 @@ class LogOgden(Energy):
             Parameter("alpha", "1", -2.5, lower=-50.0, upper=50.0, meaning="exponent of the stretches"),
         )
 
-    def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def isochoric(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         (total,) = strain.power_sums((p["alpha"],))
         return p["C1"] * minus_log(1 - p["C2"] * (total - 3))
 
-    def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def initial_shear_modulus(self, p: Constants) -> Float[Either, ""]:
         return 0.5 * p["C1"] * p["C2"] * p["alpha"] ** 2
 
-    def margin(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def margin(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         (total,) = strain.power_sums((p["alpha"],))
         return 1 - p["C2"] * (total - 3) - LIMIT

@@ -1,13 +1,13 @@
 """Mooney-Rivlin: linear in both invariants."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.strain import Strain
-from tissuejax.parameters import Parameter
+from tissuejax.parameters import Constants, Parameter
 
 
 class MooneyRivlin(Energy):
@@ -29,8 +29,8 @@ class MooneyRivlin(Energy):
             Parameter("C01", "Pa", 100.0, meaning="coefficient of I2bar - 3"),
         )
 
-    def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def isochoric(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         return p["C10"] * (strain.I1 - 3) + p["C01"] * (strain.I2 - 3)
 
-    def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def initial_shear_modulus(self, p: Constants) -> Float[Either, ""]:
         return 2 * (p["C10"] + p["C01"])

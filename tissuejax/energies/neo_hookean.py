@@ -1,13 +1,13 @@
 """Neo-Hookean: the first thing to try, and the small-strain limit of all others."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.strain import Strain
-from tissuejax.parameters import Parameter
+from tissuejax.parameters import Constants, Parameter
 
 
 class NeoHookean(Energy):
@@ -26,8 +26,8 @@ class NeoHookean(Energy):
     def parameters(self) -> tuple[Parameter, ...]:
         return (Parameter("mu", "Pa", 1000.0, lower=0.0, meaning="initial shear modulus"),)
 
-    def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def isochoric(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         return 0.5 * p["mu"] * (strain.I1 - 3)
 
-    def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def initial_shear_modulus(self, p: Constants) -> Float[Either, ""]:
         return p["mu"]

@@ -8,12 +8,13 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NamedTuple
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.strain import Strain
 from tissuejax.errors import InputError, unknown
-from tissuejax.parameters import Parameter
+from tissuejax.parameters import Constants, Parameter
 from tissuejax.tensors import total
 
 
@@ -97,15 +98,15 @@ class Ogden(Energy):
             ]
         return tuple(declared)
 
-    def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def isochoric(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         terms = self._terms(p)
         sums = strain.power_sums(tuple(alpha for _, alpha in terms))
         return total(f * (powers - 3) for (f, _), powers in zip(terms, sums))
 
-    def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def initial_shear_modulus(self, p: Constants) -> Float[Either, ""]:
         return total(0.5 * f * alpha**2 for f, alpha in self._terms(p))
 
-    def _terms(self, p: Mapping[str, Array]) -> list[tuple[Array, Array]]:
+    def _terms(self, p: Constants) -> list[tuple[Either, Either]]:
         """(f_i, alpha_i); an exponent at 0, where f_i has a pole that the sum cancels, is moved to 1e-6."""
         terms = []
         for i in range(1, self.order + 1):

@@ -1,13 +1,13 @@
 """Polynomial in both invariants, any order; order 1 is Mooney-Rivlin."""
 
-from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.strain import Strain
-from tissuejax.parameters import Parameter
+from tissuejax.parameters import Constants, Parameter
 
 
 class Polynomial(Energy):
@@ -37,7 +37,7 @@ class Polynomial(Energy):
             for i, j in self.exponents
         )
 
-    def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def isochoric(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         x, y = strain.I1 - 3, strain.I2 - 3
         psi: Any = 0.0
         for i in range(self.order, -1, -1):  # Horner in x with, inside, Horner in y
@@ -47,5 +47,5 @@ class Polynomial(Energy):
             psi = psi * x + (inner * y if i == 0 else inner)
         return psi
 
-    def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def initial_shear_modulus(self, p: Constants) -> Float[Either, ""]:
         return 2 * (p["C10"] + p["C01"])

@@ -1,13 +1,13 @@
 """Reduced polynomial in I1, any order; order 1 is neo-Hookean in C10, order 3 is Yeoh."""
 
-from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.strain import Strain
-from tissuejax.parameters import Parameter
+from tissuejax.parameters import Constants, Parameter
 
 
 class ReducedPolynomial(Energy):
@@ -31,12 +31,12 @@ class ReducedPolynomial(Energy):
         )
         return (first, *rest)
 
-    def isochoric(self, p: Mapping[str, Array], strain: Strain) -> Float[Array, "..."]:
+    def isochoric(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         x = strain.I1 - 3
         psi: Any = 0.0
         for i in range(self.order, 0, -1):  # Horner: one multiplication a term
             psi = (psi + p[f"C{i}0"]) * x
         return psi
 
-    def initial_shear_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def initial_shear_modulus(self, p: Constants) -> Float[Either, ""]:
         return 2 * p["C10"]

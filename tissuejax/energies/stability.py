@@ -14,11 +14,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.paths import SECOND, along, principal
 from tissuejax.energies.validity import check_stretches, valid_stretches
+from tissuejax.parameters import Constants
 
 PATHS = tuple(SECOND)
 
@@ -76,9 +78,7 @@ class Stability:
         return f"The material is unstable (Drucker), looked at {span}: {'; '.join(bad)}."
 
 
-def log_strain_tangent(
-    energy: Energy, p: Mapping[str, Array], path: str, stretch: Float[Array, "n"]
-) -> Float[Array, "n 2 2"]:
+def log_strain_tangent(energy: Energy, p: Constants, path: str, stretch: Float[Either, "n"]) -> Float[Either, "n 2 2"]:
     """D = d2W/de_i de_j, Pa, at each stretch along `path`; at rest 2 G [[2, 1], [1, 2]].
 
     Principal axes stay along 1, 2, 3; an energy with fibres is tested for increments along these axes only.
@@ -86,15 +86,13 @@ def log_strain_tangent(
     C = along(path, stretch).C
     start = 0.5 * jnp.stack([jnp.log(C.xx), jnp.log(C.yy)], -1)
 
-    def work(e: Float[Array, "2"]) -> Array:
+    def work(e: Float[Either, "2"]) -> Either:
         return energy.isochoric(p, principal(jnp.exp(e[0]), jnp.exp(e[1])))
 
     return jax.vmap(jax.hessian(work))(start)
 
 
-def least_eigenvalue(
-    energy: Energy, p: Mapping[str, Array], path: str, stretch: Float[Array, "n"]
-) -> Float[Array, "n"]:
+def least_eigenvalue(energy: Energy, p: Constants, path: str, stretch: Float[Either, "n"]) -> Float[Either, "n"]:
     """Least eigenvalue of D, Pa, at each stretch; stable where positive. Differentiable in `p`: a constraint."""
     D = log_strain_tangent(energy, p, path, stretch)
     middle, half, off = 0.5 * (D[:, 0, 0] + D[:, 1, 1]), 0.5 * (D[:, 0, 0] - D[:, 1, 1]), D[:, 0, 1]
@@ -103,7 +101,7 @@ def least_eigenvalue(
     return middle - jnp.where(some, jnp.sqrt(jnp.where(some, square, 1.0)), 0.0)
 
 
-def penalty(energy: Energy, p: Mapping[str, Array], stretches: Mapping[str, Float[Array, "n"]]) -> Float[Array, ""]:
+def penalty(energy: Energy, p: Constants, stretches: Mapping[str, Float[Either, "n"]]) -> Float[Either, ""]:
     """Mean square of the unstable part of the least eigenvalue over the mean size of D: 0 where stable, dimensionless.
 
     Args:
@@ -119,7 +117,7 @@ def penalty(energy: Energy, p: Mapping[str, Array], stretches: Mapping[str, Floa
 
 def stability(
     energy: Energy,
-    p: Mapping[str, Array],
+    p: Constants,
     within: tuple[float, float] = (0.5, 2.0),
     paths: tuple[str, ...] = PATHS,
     points: int = 201,
@@ -139,7 +137,7 @@ def stability(
     return Stability({path: _look(energy, p, path, _grid(energy, p, path, within, points)) for path in paths})
 
 
-def _grid(energy: Energy, p: Mapping[str, Array], path: str, within: tuple[float, float], points: int) -> np.ndarray:
+def _grid(energy: Energy, p: Constants, path: str, within: tuple[float, float], points: int) -> np.ndarray:
     """Stretches even in ln l, with 1 as a point of its own so that "nearest to rest" is well defined on both sides."""
     ends = valid_stretches(energy, p, path)
     low, high = (np.log(np.clip(w, *ends)) for w in sorted(within))
@@ -151,7 +149,7 @@ def _least(energy, p, path, stretch):
     return least_eigenvalue(energy, p, path, stretch)
 
 
-def _look(energy: Energy, p: Mapping[str, Array], path: str, stretch: np.ndarray) -> PathStability:
+def _look(energy: Energy, p: Constants, path: str, stretch: np.ndarray) -> PathStability:
     p = {name: jnp.asarray(value) for name, value in p.items()}
     least = np.asarray(_least(energy, p, path, jnp.asarray(stretch)))
     good = least > 0

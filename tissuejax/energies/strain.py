@@ -3,14 +3,15 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.spectral import power_sums
 from tissuejax.tensors import Sym, determinant, trace, trace_of_square
 
 
 @jax.custom_jvp
-def whole(x: Float[Array, "..."]) -> Float[Array, "..."]:
+def whole(x: Float[Either, "..."]) -> Float[Either, "..."]:
     """x, whose derivatives are computed as a whole before anything is made of them.
 
     A stress has six components, and XLA on CPU would work out the derivatives of the invariants anew in each of them: a
@@ -36,7 +37,7 @@ class Strain(eqx.Module):
     """
 
     C: Sym
-    J: Float[Array, "..."]
+    J: Float[Either, "..."]
 
     @classmethod
     def of(cls, C: Sym) -> "Strain":
@@ -44,16 +45,16 @@ class Strain(eqx.Module):
         return cls(C, whole(jnp.sqrt(whole(determinant(C)))))
 
     @property
-    def I1(self) -> Float[Array, "..."]:
+    def I1(self) -> Float[Either, "..."]:
         """Isochoric first invariant J^(-2/3) tr C; 3 at rest."""
         return whole(self._power_of_J(-2 / 3) * whole(trace(self.C)))
 
     @property
-    def I2(self) -> Float[Array, "..."]:
+    def I2(self) -> Float[Either, "..."]:
         """Isochoric second invariant J^(-4/3) (tr(C)^2 - tr(C^2)) / 2; 3 at rest."""
         return whole(self._power_of_J(-4 / 3) * 0.5 * whole(trace(self.C) ** 2 - trace_of_square(self.C)))
 
-    def power_sums(self, alphas: tuple[Float[Array, ""], ...]) -> tuple[Float[Array, "..."], ...]:
+    def power_sums(self, alphas: tuple[Float[Either, ""], ...]) -> tuple[Float[Either, "..."], ...]:
         """sum_i lbar_i^alpha over the isochoric principal stretches, for each alpha; 3 at rest.
 
         Exact with its derivatives (to the third) where stretches are equal; see `spectral.py`.
@@ -61,12 +62,14 @@ class Strain(eqx.Module):
         log_J = jnp.log(self.J)
         return tuple(whole(jnp.exp(-alpha / 3 * log_J) * p) for alpha, p in zip(alphas, power_sums(self.C, alphas)))
 
-    def fibre_stretch_squared(self, along_1: Float[Array, ""], along_2: Float[Array, ""]) -> Float[Array, "..."]:
+    def fibre_stretch_squared(
+        self, along_1: Float[Either, "..."], along_2: Float[Either, "..."]
+    ) -> Float[Either, "..."]:
         """I4bar = a . Cbar a, the squared isochoric stretch along a = (along_1, along_2, 0), a unit vector."""
         C = self.C
         along = along_1**2 * C.xx + along_2**2 * C.yy + 2 * along_1 * along_2 * C.xy
         return whole(self._power_of_J(-2 / 3) * whole(along))
 
-    def _power_of_J(self, exponent: float) -> Float[Array, "..."]:
+    def _power_of_J(self, exponent: float) -> Float[Either, "..."]:
         """J^exponent as exp(exponent ln J): its derivative reuses the exponential (cheap stress)."""
         return jnp.exp(exponent * jnp.log(self.J))

@@ -5,23 +5,25 @@ follow P = F S, sigma = F S F^T / J and the material tangent dS/dE = 4 d2Psi/dCd
 on `Sym`, so a trailing element axis is vectorised by XLA, and differentiates further (jvp of grad, vjp of grad, vmap).
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.strain import Strain
 from tissuejax.energies.volumetric import Volumetric
+from tissuejax.parameters import Constants
 from tissuejax.tensors import Sym, right_cauchy_green
 
-Values = Mapping[str, Array]
+Values = Constants
 
 
 def energy_density(
     energy: Energy, volumetric: Volumetric | None, p_energy: Values, p_volumetric: Values | None, C: Sym
-) -> Float[Array, "..."]:
+) -> Float[Either, "..."]:
     """Psi = psi_iso(C) + U(J), Pa; `volumetric` None leaves U out (incompressible: pressure from elsewhere)."""
     strain = Strain.of(C)
     psi = energy.isochoric(p_energy, strain)
@@ -52,8 +54,8 @@ def pk1(
     volumetric: Volumetric | None,
     p_energy: Values,
     p_volumetric: Values | None,
-    F: Float[Array, "... 3 3"],
-) -> Float[Array, "... 3 3"]:
+    F: Float[Either, "... 3 3"],
+) -> Float[Either, "... 3 3"]:
     """First Piola-Kirchhoff (nominal) stress P = F S, Pa: force per reference area, second index the normal."""
     return F @ pk2(energy, volumetric, p_energy, p_volumetric, right_cauchy_green(F)).matrix()
 
@@ -63,8 +65,8 @@ def cauchy(
     volumetric: Volumetric | None,
     p_energy: Values,
     p_volumetric: Values | None,
-    F: Float[Array, "... 3 3"],
-) -> Float[Array, "... 3 3"]:
+    F: Float[Either, "... 3 3"],
+) -> Float[Either, "... 3 3"]:
     """Cauchy (true) stress sigma = F S F^T / J, Pa."""
     P = pk1(energy, volumetric, p_energy, p_volumetric, F)
     return P @ jnp.swapaxes(F, -1, -2) / jnp.linalg.det(F)[..., None, None]
@@ -72,13 +74,13 @@ def cauchy(
 
 def tangent(
     energy: Energy, volumetric: Volumetric | None, p_energy: Values, p_volumetric: Values | None, C: Sym
-) -> Float[Array, "... 6 6"]:
+) -> Float[Either, "... 6 6"]:
     """Material tangent dS/dE = 4 d2Psi/dCdC in Voigt form, Pa: rows S and columns E in the order xx yy zz xy xz yz.
 
     Shear columns are per engineering shear 2 E_xy, so that the matrix is symmetric.
     """
 
-    def column(direction: Float[Array, "6"]) -> Float[Array, "6 ..."]:
+    def column(direction: Float[Either, "6"]) -> Float[Either, "6 ..."]:
         dC = Sym(*(d * jnp.ones_like(c) for d, c in zip(direction, C)))
         _, dS = jax.jvp(lambda c: pk2(energy, volumetric, p_energy, p_volumetric, c), (C,), (dC,))
         return jnp.stack(dS)
@@ -88,7 +90,7 @@ def tangent(
     return jnp.moveaxis(jax.vmap(column)(directions), (1, 0), (-2, -1))
 
 
-def _twice_gradient(psi: Callable[[Sym], Array], C: Sym) -> Sym:
+def _twice_gradient(psi: Callable[[Sym], Either], C: Sym) -> Sym:
     """2 dpsi/dC. An off-diagonal component stands for two entries of C, so its derivative is doubled already."""
     g = jax.grad(lambda c: jnp.sum(psi(c)))(Sym(*(jnp.asarray(x) for x in C)))
     return Sym(2 * g.xx, 2 * g.yy, 2 * g.zz, g.xy, g.xz, g.yz)

@@ -1,10 +1,7 @@
 """What laws of a matrix with two symmetric families of fibres share: constants and directions."""
 
-from collections.abc import Mapping
-
-from jaxtyping import Array
-
-from tissuejax.parameters import Parameter
+from tissuejax.arrays import Either
+from tissuejax.parameters import Constants, Parameter
 
 REINFORCED = (
     Parameter("mu", "Pa", 1000.0, lower=0.0, meaning="shear modulus of the matrix"),
@@ -19,6 +16,6 @@ DIRECTIONS = (
 )
 
 
-def directions(p: Mapping[str, Array]) -> tuple[Array, Array]:
+def directions(p: Constants) -> tuple[Either, Either]:
     """Direction of each family from axis 1 to 2, rad: `angle` plus and minus `spread`."""
     return p["angle"] + p["spread"], p["angle"] - p["spread"]

@@ -13,8 +13,9 @@ Source: Bonet and Wood 2008, Nonlinear Continuum Mechanics for Finite Element An
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.strain import Strain
 from tissuejax.tensors import trace
 
@@ -22,8 +23,8 @@ from tissuejax.tensors import trace
 class Unsplit(eqx.Module):
     """mu/2 (tr C - I1bar) - mu ln J, Pa: takes mu/2 (I1bar - 3) to mu/2 (tr C - 3) - mu ln J; neutral mu = 0."""
 
-    mu: Float[Array, ""]
+    mu: Float[Either, ""]
 
-    def __call__(self, strain: Strain) -> Float[Array, "..."]:
+    def __call__(self, strain: Strain) -> Float[Either, "..."]:
         """Energy per stress-free volume, Pa; zero with zero slope at rest."""
         return self.mu * (0.5 * (trace(strain.C) - strain.I1) - jnp.log(strain.J))

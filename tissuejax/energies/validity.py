@@ -3,21 +3,21 @@
 Inside a traced function nothing can be raised; there the energies continue smoothly (`barrier.py`).
 """
 
-from collections.abc import Mapping
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from tissuejax.arrays import Either
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.paths import along
 from tissuejax.energies.strain import Strain
 from tissuejax.errors import InputError
+from tissuejax.parameters import Constants
 
 
-def check_valid(energy: Energy, p: Mapping[str, Array], strain: Strain, where: str = "the strain asked for") -> None:
+def check_valid(energy: Energy, p: Constants, strain: Strain, where: str = "the strain asked for") -> None:
     """Nothing, if every strain lies in the valid range of `energy` with parameters `p`; traced inputs pass.
 
     Args:
@@ -39,7 +39,7 @@ def check_valid(energy: Energy, p: Mapping[str, Array], strain: Strain, where: s
         )
 
 
-def check_stretches(stretch: Float[Array, "..."] | np.ndarray, where: str = "stretch") -> None:
+def check_stretches(stretch: Float[Either, "..."] | np.ndarray, where: str = "stretch") -> None:
     """Nothing, if every stretch is finite and above 0.
 
     Raises:
@@ -55,7 +55,7 @@ def check_stretches(stretch: Float[Array, "..."] | np.ndarray, where: str = "str
 
 
 def valid_stretches(
-    energy: Energy, p: Mapping[str, Array], path: str = "uniaxial", within: tuple[float, float] = (0.1, 10.0)
+    energy: Energy, p: Constants, path: str = "uniaxial", within: tuple[float, float] = (0.1, 10.0)
 ) -> tuple[float, float]:
     """The valid range of stretch around 1 along `path`, not looked for beyond `within`; (nan, nan) if 1 is outside."""
 

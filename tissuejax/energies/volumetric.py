@@ -4,14 +4,14 @@ The forms met in the field: K/2 (J-1)^2, K/2 ln(J)^2 and ABAQUS's sum_i (J-1)^(2
 """
 
 import abc
-from collections.abc import Mapping
 from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from tissuejax.parameters import Parameter
+from tissuejax.arrays import Either
+from tissuejax.parameters import Constants, Parameter
 from tissuejax.tensors import total
 
 
@@ -27,11 +27,11 @@ class Volumetric(eqx.Module):
         """Declared parameters."""
 
     @abc.abstractmethod
-    def energy(self, p: Mapping[str, Array], J: Float[Array, "..."]) -> Float[Array, "..."]:
+    def energy(self, p: Constants, J: Float[Either, "..."]) -> Float[Either, "..."]:
         """U(J), Pa."""
 
     @abc.abstractmethod
-    def bulk_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def bulk_modulus(self, p: Constants) -> Float[Either, ""]:
         """Initial bulk modulus U''(1), Pa."""
 
 
@@ -45,10 +45,10 @@ class Quadratic(Volumetric):
     def parameters(self) -> tuple[Parameter, ...]:
         return (Parameter("K", "Pa", 20e3, lower=0.0, meaning="bulk modulus"),)
 
-    def energy(self, p: Mapping[str, Array], J: Float[Array, "..."]) -> Float[Array, "..."]:
+    def energy(self, p: Constants, J: Float[Either, "..."]) -> Float[Either, "..."]:
         return 0.5 * p["K"] * (J - 1) ** 2
 
-    def bulk_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def bulk_modulus(self, p: Constants) -> Float[Either, ""]:
         return p["K"]
 
 
@@ -62,10 +62,10 @@ class Logarithmic(Volumetric):
     def parameters(self) -> tuple[Parameter, ...]:
         return (Parameter("K", "Pa", 20e3, lower=0.0, meaning="bulk modulus"),)
 
-    def energy(self, p: Mapping[str, Array], J: Float[Array, "..."]) -> Float[Array, "..."]:
+    def energy(self, p: Constants, J: Float[Either, "..."]) -> Float[Either, "..."]:
         return 0.5 * p["K"] * jnp.log(J) ** 2
 
-    def bulk_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def bulk_modulus(self, p: Constants) -> Float[Either, ""]:
         return p["K"]
 
 
@@ -83,8 +83,8 @@ class Compressibility(Volumetric):
             for i in range(1, self.order + 1)
         )
 
-    def energy(self, p: Mapping[str, Array], J: Float[Array, "..."]) -> Float[Array, "..."]:
+    def energy(self, p: Constants, J: Float[Either, "..."]) -> Float[Either, "..."]:
         return total((J - 1) ** (2 * i) / p[f"D{i}"] for i in range(1, self.order + 1))
 
-    def bulk_modulus(self, p: Mapping[str, Array]) -> Float[Array, ""]:
+    def bulk_modulus(self, p: Constants) -> Float[Either, ""]:
         return 2 / p["D1"]

@@ -209,7 +209,7 @@ def _correlated(
     for _ in range(ROUNDS if near is None else ROUNDS - 1):
         shares = np.minimum(1 / (1 + np.exp(-logits)), 1 - NEVER_WHITE)
         maps = [s(shares, np.exp(logs), s.walks(*r), free, order) for s, r in zip(surfaces, ranges)]
-        total = sum(t[0] for t in maps)
+        total = sum((t[0] for t in maps[1:]), maps[0][0])
         i, j = np.unravel_index(np.argmax(total), total.shape)
         if apart is None:
             own = sum(max(float(np.max(t[0])), w) for t, w in zip(maps, white))
@@ -218,8 +218,8 @@ def _correlated(
             levels = [math.sqrt(t[2][i, j]) for t in maps]
             best = _Found(float(shares[i]), float(math.exp(logs[j])), float(total[i, j]), levels, apart, order)
         ranges = [_narrowed(r, float(t[1][i, j])) for r, t in zip(ranges, maps)]
-        logits = _around(logits, i)
-        logs = _around(logs, j)
+        logits = _around(logits, int(i))
+        logs = _around(logs, int(j))
     return best
 
 

@@ -112,7 +112,8 @@ class Corrected(Derivatives):
 
     def moved(self, step, missed, kept):
         """See `Derivatives.moved`."""
-        if kept and self.age < AGE and step @ step > 0 and not self.lacking:
+        following = kept and self.age < AGE and step @ step > 0 and not self.lacking
+        if following and self.jacobian is not None:
             self.jacobian, self.age = self.jacobian + np.outer(missed, step) / (step @ step), self.age + 1
         else:
             self.forget()

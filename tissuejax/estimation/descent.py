@@ -126,7 +126,7 @@ def descend(
         if why := rule.here(cost, r, jacobian, size):
             return ended(why)
         q, triangle = np.linalg.qr(seen)
-        aim, taken = -(q.T @ r), False
+        aim, taken, found = -(q.T @ r), False, r
         for attempt in range(method.tries):
             trial = reach.trial(triangle, aim, np.sqrt(held) * size, y, attempt)
             step = trial - y

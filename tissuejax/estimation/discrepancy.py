@@ -147,7 +147,9 @@ class Discrepancy:
             for alike, a, b in zip(self.fading, edges, edges[1:], strict=False)
         )
         changing = (Part("waning gain", "slow", within=waning),) if waning else ()
-        once = tuple(Part(s.name, "sudden", s.factor(prediction, self.timed)) for s in self.sudden)
+        timed = self.timed
+        moments = self.sudden if timed is not None else ()
+        once = tuple(Part(s.name, "sudden", s.factor(prediction, timed)) for s in moments if timed is not None)
         return (*laws, *several, *turning, *self.fixed, *changing, *once)
 
 

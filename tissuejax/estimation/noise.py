@@ -27,6 +27,8 @@ from scipy.linalg import lapack
 
 from tissuejax.errors import InputError
 
+_banded = getattr(lapack, "dtbtrs")  # noqa: B009  its stubs don't list it
+
 NEGLIGIBLE = 1e-3  # share of the variance, or correlation of neighbours, below which noise is treated as white
 
 
@@ -127,7 +129,7 @@ class Noise:
         band[1, :-1] = -fade * (1 - gain[:-1])
         right = np.zeros_like(columns)
         right[1:] = (fade * gain[:-1])[:, None] * columns[:-1]
-        foretold, info = lapack.dtbtrs(band, right, uplo="L", diag="U")
+        foretold, info = _banded(band, right, uplo="L", diag="U")
         if info != 0:
             raise RuntimeError(f"dtbtrs: {info}")
         return ((columns - foretold) / np.sqrt(variance)[:, None]).reshape(x.shape)
@@ -197,7 +199,7 @@ def _faded(fade: Float[np.ndarray, " m"], x: Float[np.ndarray, "n k"]) -> Float[
     band[1, :-1] = -fade
     right = np.zeros_like(x)
     right[1:] = fade[:, None] * x[:-1]
-    return lapack.dtbtrs(band, right, uplo="L", diag="U")[0]
+    return _banded(band, right, uplo="L", diag="U")[0]
 
 
 def _second(gap: float) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ of the discrepancy (`diagnosis.probing_view`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Float
@@ -65,7 +65,8 @@ def changes(problem: Problem, values: Mapping[str, float], predict: Predict, fin
         finer: foretell the residuals on the finer mesh.
         numerical: what mesh, step and penalty leave open.
     """
-    base = problem.predictor.settings
+    predictor = cast(ProbingPredictor, problem.predictor)
+    base = predictor.settings
     fast = base.coarse
     wanted = {"here": base}
     if finer or numerical:
@@ -73,7 +74,7 @@ def changes(problem: Problem, values: Mapping[str, float], predict: Predict, fin
     if numerical:
         wanted["penalty"] = fast.changed(penalty=2 * fast.penalty)
     order = sorted(wanted, key=lambda name: name != "mesh")  # the longest run first
-    predicted = predict([problem.predictor.with_settings(wanted[name]) for name in order], values)
+    predicted = predict([predictor.with_settings(wanted[name]) for name in order], values)
     r = {name: problem.misfit(p, values) for name, p in zip(order, predicted, strict=True)}
     left = {}
     if numerical:

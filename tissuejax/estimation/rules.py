@@ -131,7 +131,7 @@ class Precise(Rule):
 
     def here(self, cost, r, jacobian, size):
         """See `Rule.here`."""
-        upper = np.linalg.qr(np.column_stack([jacobian / size, r]), mode="r")
+        upper = np.asarray(np.linalg.qr(np.column_stack([jacobian / size, r]), mode="r"))
         u, s, _ = np.linalg.svd(upper[:, :-1], full_matrices=False)
         seen = s > UNSEEN * (s[0] if len(s) and s[0] > 0 else 1.0)
         promised = 0.5 * float(np.sum((u[:, seen].T @ upper[:, -1]) ** 2))

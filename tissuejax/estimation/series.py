@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import ArrayLike, Bool, Float, Int
 
 from tissuejax.recordings.recording import Recording, Sample
 
@@ -119,7 +119,7 @@ class Series:
                     places.append(kept * width + j)
         return cls(tuple(segments), np.concatenate(y) if y else np.zeros(0), tuple(places))
 
-    def stacked(self, values: Callable[[str, str], np.ndarray]) -> Float[np.ndarray, " N"]:
+    def stacked(self, values: Callable[[str, str], ArrayLike]) -> Float[np.ndarray, " N"]:
         """The long vector of what `values` gives as a whole array for a recording's channel."""
         out, whole = np.empty(len(self.y)), {}
         for s, place in zip(self.segments, self.places, strict=True):
