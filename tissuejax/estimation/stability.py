@@ -7,6 +7,7 @@ occur in the recordings, so that nobody is warned of states the data never came 
 
 from collections.abc import Mapping
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -63,7 +64,7 @@ def ranges(recordings: Mapping[str, Recording]) -> dict[str, tuple[float, float]
 
 def recorded_stability(predictor: Predictor, values: Mapping[str, float]) -> Stability:
     """Stability of the energy at `values` over the recorded stretches."""
-    constants = {name: float(v) for name, v in under("energy", values).items()}
+    constants: dict[str, Any] = {name: float(v) for name, v in under("energy", values).items()}
     within = ranges({name: predictor.sample.recordings[name] for name in predictor.names})
     paths: dict[str, PathStability] = {}
     for path in PATHS:
