@@ -17,8 +17,8 @@ from tissuejax.storage import write_json
 jax.config.update("jax_enable_x64", True)
 
 PARTS = (
-    "bonded", "peel", "strip", "beam", "strength", "steady", "meshes", "cost", "derivatives", "nearly", "recovery",
-    "source",
+    "bonded", "peel", "strip", "beam", "strength", "steady", "meshes", "cost", "derivatives", "nearly", "solid",
+    "separation", "recovery", "source",
 )  # fmt: skip
 
 

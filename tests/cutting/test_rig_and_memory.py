@@ -78,15 +78,15 @@ def slice_():
 def test_a_simulated_blade_stands_behind_and_its_work_is_its_own(slice_):
     """Means over an element, as ripples come at other times where the blade is elsewhere."""
     p, x = slice_
-    stiff, soft = p.run(KNOWN)["r"], p.run(KNOWN | {COMPLIANCE: 0.02})["r"]
+    stiff, soft = p.run(KNOWN)["r"], p.run(KNOWN | {COMPLIANCE: 5e-3})["r"]
     assert float(soft.imbalance) < 0.005
     stiff, soft = np.asarray(stiff.force), np.asarray(soft.force)
     mean = lambda f: np.convolve(f, np.ones(20) / 20, "valid")  # noqa: E731  1 mm at 2 mm/s and 40 Hz
     late = x > 1e-3
-    expected = np.interp(x - 0.02 * soft, x, stiff)
+    expected = np.interp(x - 5e-3 * soft, x, stiff)
     top = stiff.max()
     assert np.abs(mean(soft[late]) - mean(expected[late])).max() < 0.03 * top
-    assert np.abs(mean(soft[late]) - mean(stiff[late])).max() > 0.05 * top
+    assert np.abs(mean(soft[late]) - mean(stiff[late])).max() > 0.02 * top
 
 
 def test_relaxing_tissue_asks_less_of_a_simulated_blade(slice_):

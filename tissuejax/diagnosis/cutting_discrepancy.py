@@ -11,7 +11,7 @@ time and what scatters may be strange without a name.
 | place, fine place | squared exponential in place (0.4 and 0.12 of the way) where fresh tissue is parted: prediction |
 | gain | constant, of each stroke's own: prediction |
 | onset | squared exponential in place (0.12) fading over `ENTRY` from the entry, of each stroke's own: prediction |
-| slow | exponential in time (0.05, 0.25 and 1.5 of the record), of each stroke's own: greatest force |
+| slow | exponential in time (0.05, 0.25 and 1.5 of the record), of each stroke's own: `WANDER` of the greatest force |
 | white | what scatters from sample to sample beyond the stated noise: greatest force |
 """
 
@@ -27,6 +27,7 @@ from tissuejax.estimation.discrepancy import LAW, SLOW, Part, smooth_factor
 
 PLACE = {"place": 0.4, "fine place": LAW["fine law"]}  # correlation lengths, of the longest way
 ENTRY = 4e-3  # m: twice the length over which a force sets in
+WANDER = 0.3  # of what wanders in material tests: a cut is over in a minute, and a zero that goes farther is a drift
 MAP = Candidate("toughness-map", (), form="of each stroke's own", widens={"law": 0.15})
 
 
@@ -71,7 +72,7 @@ def cutting_discrepancy(bench: Bench, cut: Blocks, fresh: Mapping[str, Float[np.
         within = []
         for r, peak in zip(rows, peaks, strict=True):
             elapsed = time[r] / (float(np.ptp(time[r])) or 1.0)
-            within.append(peak**2 * np.exp(-np.abs(elapsed[:, None] - elapsed) / share))
+            within.append((WANDER * peak) ** 2 * np.exp(-np.abs(elapsed[:, None] - elapsed) / share))
         fixed.append(Part(name, "slow", within=tuple(within)))
     scatter = [
         np.diag((peak * sigma[r] / max(float(np.median(sigma[r])), 1e-300)) ** 2)

@@ -21,8 +21,8 @@ class MachineCompliance(Effect):
 
     Force is P area and the rig's displacement compliance times force, a share of the height. Solved by four Newton
     steps with the slope of P under a shift of the whole history (exact for an elastic specimen). An unknown area or
-    height counts as a cube of 1 cm edge. In a cut the blade stands compliance * force behind where it was driven to.
-    Neutral: compliance 0.
+    height counts as a cube of 1 cm edge. In a cut the blade stands compliance * force behind where it was driven to,
+    along the cut. Neutral: compliance 0.
 
     Revealed by stiffness that falls with load, alike in tension and compression, and by specimens of unlike size that
     disagree; in cuts by a deeper one that sets in later. Blind: one specimen in one mode: it then looks like another

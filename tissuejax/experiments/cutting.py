@@ -23,7 +23,7 @@ from jaxtyping import Array, Float
 
 from tissuejax.effects.cutting_test import Cut
 from tissuejax.errors import InputError
-from tissuejax.experiments.cutting_layers import layer, relaxed
+from tissuejax.experiments.cutting_layers import ages, layer, relaxed
 from tissuejax.experiments.cutting_record import Path
 from tissuejax.experiments.experiment import Experiment
 from tissuejax.model import Model
@@ -75,13 +75,15 @@ def balance_force(
     Args:
         since: `cutting_layers.ages` of the path, worked out here by default (the path is then no tracer).
     """
-    path = Path(*(jnp.asarray(x) for x in path))
+    given, path = path, Path(*(jnp.asarray(x) for x in path))
     begun = path.time[jnp.argmax(path.x > 0)]
     layers = layer(model, values, path.half, path.thickness)
 
     def force(x, front):
         cut = met(model, values, path, front, path.speed, path.time - begun, path.depth)
-        wedge, pressure = layers[:2] if cut.relaxing is None else relaxed(layers, cut.relaxing, path, since)
+        wedge, pressure = layers[:2]
+        if cut.relaxing is not None:
+            wedge, pressure = relaxed(layers, cut.relaxing, path, ages(given) if since is None else since)
         fresh = 1 - jnp.exp(-jnp.maximum(cut.at - path.notch, 0.0) / cut.onset)
         inside = 1 - jnp.exp(-jnp.maximum(jnp.asarray(x), 0.0) / cut.onset)
         parting = path.fresh * cut.energy * fresh + wedge * inside

@@ -94,7 +94,8 @@ class Probe(eqx.Module):
         adhesion: greatest pull at separation, Pa; neutral 0.
         reach: gap at which the pull is greatest, m; bonds are gone at five times that.
         offset: shift of the whole path (mounting), m; neutral 0.
-        compliance: of the machine: the probe gives way by compliance * force, m/N; neutral 0.
+        compliance: of the machine: the probe gives way by compliance * force, m/N, one number or one an axis;
+            neutral 0.
     """
 
     time: Float[Array, " n"]
