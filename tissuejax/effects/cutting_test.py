@@ -16,6 +16,7 @@ class Cut(eqx.Module):
         energy: toughness, J/m^2. strength: Pa. depth: in which the blade cuts there, m.
         friction: Coulomb coefficient between blade and tissue.
         onset: length over which the force sets in at the entry, m; only in a force balance, a simulation has its own.
+        squeezing: factor on what the layers beside the blade take; only in a force balance.
         compliance: of the rig that holds the blade, m/N; None for a stiff one.
         relaxing: shares of the isochoric stress that relax, and their times (s); None for elastic tissue.
     """
@@ -29,6 +30,7 @@ class Cut(eqx.Module):
     depth: Float[Array, " P"]
     friction: Float[Array, ""]
     onset: Float[Array, ""]
+    squeezing: Float[Array, " P"] | float = 1.0
     compliance: Float[Array, ""] | None = None
     relaxing: tuple[Float[Array, " m"], Float[Array, " m"]] | None = None
 

@@ -86,7 +86,7 @@ def balance_force(
             wedge, pressure = relaxed(layers, cut.relaxing, path, ages(given) if since is None else since)
         fresh = 1 - jnp.exp(-jnp.maximum(cut.at - path.notch, 0.0) / cut.onset)
         inside = 1 - jnp.exp(-jnp.maximum(jnp.asarray(x), 0.0) / cut.onset)
-        parting = path.fresh * cut.energy * fresh + wedge * inside
+        parting = path.fresh * cut.energy * fresh + wedge * cut.squeezing * inside
         contact = jnp.clip(jnp.asarray(x), 0, path.length)
         way = jnp.tanh(jnp.asarray(path.speed) / 1e-4)  # at rest the springs of friction hold what they held
         slope, rub = jnp.tan(0.5 * path.angle), cut.friction * way
