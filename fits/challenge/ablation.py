@@ -2,27 +2,27 @@
 
 python fits/challenge/ablation.py out/rest-second     a folder that `tissuejax challenge run` has filled, keys and all
 
-Prints, per setting: effects named with nothing wrong beside them, wrong names where nothing but a rest acts, all
-answers right, and the expected calibration error. Only folders whose cases are opened should be looked at so.
+Prints, per setting: effects named with nothing wrong beside them, wrong answers where no effect of the catalogue acts,
+all answers right, and the expected calibration error, as the grading of that kind of set counts them. Only folders
+whose cases are opened should be looked at so. What sets are weighed by is in their evidence already (`WEIGHED`).
 """
 
 import json
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from tissuejax.challenge.rest_marks import mark_rest
+from tissuejax.challenge.verdicts import mark
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence, read_evidence
 from tissuejax.diagnosis.judgement.judge import judge
 from tissuejax.diagnosis.judgement.rejudge import verdict_of
 
 EDGES = (0.5, 0.7, 0.8, 0.9, 0.95)  # of stated probability
-
-
 # What sets are fitted and weighed by is in their evidence already: these want the diagnoses run again.
 WEIGHED = ("unknown", "shares", "strange", "sudden", "change", "rig", "shape", "misstated")
 
@@ -52,27 +52,47 @@ def stored(folder: Path) -> dict[str, tuple[Evidence, dict]]:
     return {p.parent.name: (read_evidence(p), json.loads(p.with_name("result.json").read_text())) for p in found}
 
 
-def row(cases: dict[str, tuple[Evidence, dict]], keys: dict, criteria: Criteria) -> str:
+@dataclass(frozen=True)
+class Answer:
+    """One case judged: whether an effect acts that could be named, whether the answer is right, and true as such."""
+
+    acts: bool
+    right: bool
+    apt: bool
+    stated: float
+
+
+def answered(name: str, key: dict, said: dict, rest: bool) -> Answer:
+    """An answer as the grading of its kind of set counts it."""
+    if rest:
+        m = mark_rest(name, key, said)
+        return Answer(bool(m.truth), m.right if m.truth else not m.wrong, m.apt, said["confidence"])
+    plain = mark(name, key, said)
+    return Answer(plain.category in ("one", "two", "three"), plain.right, plain.apt, said["confidence"])
+
+
+def row(cases: dict[str, tuple[Evidence, dict]], keys: dict, criteria: Criteria, rest: bool) -> str:
     """Four figures of these cases, judged by these criteria."""
-    marks, stated = [], []
-    for name, (evidence, result) in cases.items():
-        said = result | verdict_of(judge(evidence, criteria), criteria)
-        marks.append(mark_rest(name, keys[name], said))
-        stated.append(said["confidence"])
-    right, sure = np.array([m.right for m in marks]), np.array(stated)
-    bins = np.digitize(sure, EDGES)
-    error = sum(abs(sure[bins == b].mean() - right[bins == b].mean()) * np.mean(bins == b) for b in set(bins))
-    effects = np.mean([m.right for m in marks if m.truth])
-    wrong = np.mean([bool(m.wrong) for m in marks if not m.truth])
-    return f"effects {effects:.0%}, wrong on a rest {wrong:.0%}, all right {right.mean():.0%}, calibration {error:.2f}"
+    marks = [
+        answered(name, keys[name], result | verdict_of(judge(evidence, criteria), criteria), rest)
+        for name, (evidence, result) in cases.items()
+    ]
+    apt, stated = np.array([m.apt for m in marks]), np.array([m.stated for m in marks])
+    bins = np.digitize(stated, EDGES)
+    error = sum(abs(stated[bins == b].mean() - apt[bins == b].mean()) * np.mean(bins == b) for b in set(bins))
+    effects = np.mean([m.right for m in marks if m.acts])
+    wrong = np.mean([not m.right for m in marks if not m.acts])
+    every = np.mean([m.right for m in marks])
+    return f"effects {effects:.0%}, wrong without one {wrong:.0%}, all right {every:.0%}, calibration {error:.2f}"
 
 
 def main(folder: Path) -> None:
     """Print a row a setting."""
     keys = json.loads((folder / "sealed" / "keys.json").read_text())
     keys, cases = keys.get("cases", keys), stored(folder)
+    rest = json.loads((folder / "manifest.json").read_text())["kind"] == "rest"
     for label, criteria in settings():
-        print(f"{label:34s} {row(cases, keys, criteria)}")
+        print(f"{label:34s} {row(cases, keys, criteria, rest)}")
 
 
 if __name__ == "__main__":
