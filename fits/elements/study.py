@@ -3,11 +3,12 @@
 Hourglass control is a share of the shear modulus at rest. Under a deep probe a law that stiffens has a larger modulus,
 so the control is a smaller share of it. Here the share itself is varied twentyfold, for a mild and a steep law, beside
 a finer mesh: what a modulus that grows n times under the ball would do is bounded by what a share n times as large does
-everywhere. Beside it, what a step of each element costs.
+everywhere. Beside it a cube squashed between bonded plates (`cube.py`), and what a step of each element costs.
 
 tissuejax study fits/elements
 """
 
+import runpy
 import time
 from pathlib import Path
 
@@ -70,6 +71,13 @@ def cost(element: str | None) -> float:
 def main(folder: Path) -> str:
     """Forces by share and mesh, and costs; result.json and a figure."""
     record: dict = {"depth_m": DEPTHS.tolist(), "force_N": {}}
+    cube = runpy.run_path(str(folder / "cube.py"))
+    record["cube squashed to 0.7"] = cube["squashed"]()
+    write_json(folder / "result.json", record)
+    write_figure(folder / "figures" / "cube.png", converging(record["cube squashed to 0.7"]), dpi=110)
+    probing = runpy.run_path(str(folder / "probing.py"))
+    if probing["practice"]().is_dir():
+        record["p01 at its true constants, chi-square of the force a sample"] = probing["misfits"]()
     record["ns_an_element_and_step"] = {name or "hexahedron": cost(name) for name in (None, "hexahedron-bending")}
     for law in LAWS:
         found = record["force_N"][law] = {}
@@ -96,6 +104,24 @@ def drawn(record) -> Figure:
         ax.set_xlabel("depth (mm)")
         ax.grid(color="#e6ebef")
     axes[0].set_ylabel("force over that of the finer\nmesh, share 0.1 (%)")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside right center", frameon=False, fontsize=8)
+    return figure
+
+
+def converging(cube: dict) -> Figure:
+    """Error of the plate's force by elements along an edge; a panel for each ratio of bulk to shear modulus."""
+    figure = Figure(figsize=(9, 3.2), layout="constrained")
+    axes = figure.subplots(1, len(cube), sharey=True)
+    for ax, (ratio, found) in zip(axes, cube.items(), strict=True):
+        for name, errors in found["error_percent"].items():
+            style = "k--s" if "felupe" in name else "-o"
+            ax.semilogx([int(n) for n in errors], list(errors.values()), style, markersize=4, label=name)
+        ax.set_title(ratio, loc="left", fontsize=9)
+        ax.set_xticks([4, 8, 16, 24], labels=["4", "8", "16", "24"])
+        ax.minorticks_off()
+        ax.set_xlabel("elements along an edge of the cube")
+        ax.grid(color="#e6ebef")
+    axes[0].set_ylabel("force over the limit (%)")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside right center", frameon=False, fontsize=8)
     return figure
 

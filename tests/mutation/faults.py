@@ -55,7 +55,7 @@ FAULTS = (
           "return max(scale, 1e-12), float(dof)", "return 1.0, float(dof)", "tests/diagnosis/test_intervals.py"),
     Fault("score: columns not projected", "diagnosis/score.py",
           "columns = columns - basis @ (basis.T @ columns)", "columns = columns - 0 * basis @ (basis.T @ columns)",
-          "tests/diagnosis/test_engine.py -k 'span_of_the_base'"),
+          "tests/diagnosis/test_engine.py -k 'gain_of_a_linear_refit'"),
     Fault("noise: the mismatch falls as f^-2", "estimation/correlation.py",
           "aa = aa + 2 * dt * ab + dt**2 * bb + walk * dt**3 / 3", "aa = aa + 2 * dt * ab + dt**2 * bb + walk * dt",
           "tests/estimation/test_correlation.py -k 'likelihood_is_that'"),

@@ -246,7 +246,7 @@ class Exploration:
             free = [c for c in self.bench.candidates.values() if c.widens and c.name not in self.names(key)]
             seen = {c.key: [Score(c.key, math.inf, 0.0, {}, {}, np.zeros(0), ((0.0, {}, {}),))] for c in free}
             for s in self.score(key):
-                if s.gain < (self.effort.least if not key else 0.0):
+                if s.gain < (0.0 if key and self.bench.costly else self.effort.least):
                     break
                 seen.setdefault(self.bench.candidates[s.key].name, []).append(s)
             lists.append([(key, rows[0]) for rows in itertools.islice(seen.values(), each)])
@@ -272,6 +272,10 @@ class Exploration:
             {**parent.refit.values, **setting, **inside(self.bench, candidate, step, setting, parent.refit.values)}
             for _, step, setting in distinct(score, self.effort.starts, whole=not key and self.effort.starts > 1)
         ]
+        alone = self.weighed.get(frozenset({score.key}))
+        if key and alone is not None and not self.bench.costly:  # beside a discrepancy that has taken up the misfit a
+            own = {p: x for p, x in alone.refit.values.items() if p not in parent.refit.values}  # step from nothing is
+            starts.append({**parent.refit.values, **own})  # short, and a gap, say, is far from where it leads
         return self.weigh((*parent.evidence.keys, score.key), starts, bench=parent.bench)
 
     def reshape(self, key: frozenset) -> None:
