@@ -1,4 +1,4 @@
-"""A cube squashed to 0.7 between bonded plates: how fast does each element converge, at each share of hourglass control?
+"""A cube squashed to 0.7 between bonded plates: how fast does each element converge, by hourglass control?
 
 An eighth of the cube, by symmetry. The reference is felupe's mixed hexahedron (displacement, pressure and volume apart;
 no code in common), on meshes of up to 24 elements along an edge of the whole cube, extrapolated.
@@ -81,7 +81,7 @@ def force(element: str | None, along: int, share: float | None, ratio: float) ->
 
 
 def extrapolated(found: dict[int, float]) -> tuple[float, float]:
-    """Limit and order of three meshes: f = limit + c n^-order. The edges of the plates are singular: the order is low."""
+    """Limit and order of three meshes: f = limit + c n^-order; low, since the edges of the plates are singular."""
     (a, fa), (b, fb), (c, fc) = sorted(found.items())
     seen = (fa - fb) / (fb - fc)
     order = float(brentq(lambda p: (a**-p - b**-p) / (b**-p - c**-p) - seen, 0.1, 4.0))

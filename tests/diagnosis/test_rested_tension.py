@@ -26,8 +26,8 @@ def stress(stretch, time):
 
 
 def test_relaxation_and_slack_are_found_together(rng):
-    """Beside relaxation alone a small step of the gap gains nothing, since the law has taken up the rest: the pair has to
-    be begun where the gap stood alone."""
+    """Beside relaxation alone a small step of the gap gains nothing, since the law has taken up the rest: the pair has
+    to be begun where the gap stood alone."""
     time = np.arange(0, 60, 0.2)
     stretch = 1 + 0.2 * np.clip(time / 10, 0, 1)
     values = stress(stretch, time) + NOISE * rng.normal(size=len(time))
