@@ -77,7 +77,8 @@ def checked(values: Mapping[str, float], declared: Mapping[str, Parameter]) -> d
             raise unknown("parameter", path, declared)
         p = declared[path]
         if not math.isfinite(value) or not p.lower <= value <= p.upper:
-            raise InputError(f"{path} = {value} {p.unit}: allowed is {p.lower} to {p.upper} {p.unit}; change the value")
+            unit = "" if p.unit == "1" else f" {p.unit}"
+            raise InputError(f"{path} = {value}{unit}: allowed is {p.lower} to {p.upper}{unit}; change the value")
     return dict(values)
 
 

@@ -67,9 +67,9 @@ class Problem:
             lower, upper = self.bound(path)
             value = float(self.start[path])
             if not math.isfinite(value) or not lower <= value <= upper:
-                unit = declared[path].unit
+                unit = "" if declared[path].unit == "1" else f" {declared[path].unit}"
                 raise InputError(
-                    f"start of {path} = {value} {unit}: allowed is {lower} to {upper} {unit}; move the start"
+                    f"start of {path} = {value}{unit}: allowed is {lower} to {upper}{unit}; move the start"
                 )
         for path, (_, std) in self.priors.items():
             if not std > 0:

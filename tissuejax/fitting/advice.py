@@ -34,7 +34,8 @@ def warnings_of(found: "Fit") -> list[str]:
         lower, upper = problem.bound(path)
         limit = lower if side == "lower" else upper
         unit = problem.predictor.model.parameters[path].unit
-        said.append(f"{path} ended at its {side} bound ({limit:g} {unit}); its standard error means little there.")
+        shown = f"{limit:g}{'' if unit == '1' else f' {unit}'}"
+        said.append(f"{path} ended at its {side} bound ({shown}); its standard error means little there.")
     said += [begun(text) for text in found.uncertainty.sentences]
     said += _twins(found)
     said += [text] if (text := sentence(found.stability)) else []

@@ -7,13 +7,16 @@ SCALED = {"Pa", "N", "m", "s"}
 
 
 def display(unit: str, size: float) -> tuple[float, str]:
-    """(divisor, unit) that brings a quantity of magnitude `size` near one; Pa, N, m and s take prefixes."""
+    """(divisor, unit) that brings a quantity of magnitude `size` near one; Pa, N, m and s take prefixes.
+
+    Nobody counts in thousandths of a pascal: mPa is a slip for MPa.
+    """
     if unit not in SCALED or not math.isfinite(size) or size <= 0:
         return 1.0, unit
     for factor, prefix in PREFIXES:
         if (unit != "s" or factor <= 1) and size >= factor:
-            return factor, prefix + unit
-    return 1e-6, "u" + unit
+            return (factor, prefix + unit) if unit != "Pa" or factor >= 1 else (1.0, unit)
+    return (1e-6, "u" + unit) if unit != "Pa" else (1.0, unit)
 
 
 def with_std(value: float, std: float | None) -> str:
