@@ -12,6 +12,7 @@ from tissuejax import effects as package
 from tissuejax.diagnosis.diagnose import diagnose
 from tissuejax.diagnosis.probing_catalogue import probing_entries
 from tissuejax.effects.catalogue import effects
+from tissuejax.effects.form import Probed
 from tissuejax.energies.catalogue import energy
 from tissuejax.model import Model
 from tissuejax.recordings.recording import Channel, Recording, Sample
@@ -112,7 +113,7 @@ def test_a_new_effect_of_probings_is_a_candidate_without_another_edit(tmp_path, 
     monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path)])
     importlib.invalidate_caches()
     try:
-        entry = next(e for e in probing_entries(1.0) if e.title == "crosstalk")
+        entry = next(e for e in probing_entries(Probed(1.0, 1.0, 1.0)) if e.title == "crosstalk")
         model = Model(energy("neo-hookean"), None, (entry.effect,))
         free, start, (candidate,) = entry.declare(model, ("r1",), ("r2",))
         assert candidate.amplitudes == ("effects.crosstalk.gain",)
@@ -123,6 +124,6 @@ def test_a_new_effect_of_probings_is_a_candidate_without_another_edit(tmp_path, 
 
 
 def test_every_effect_of_probings_is_a_candidate_unless_its_size_is_known():
-    entries = {e.title for e in probing_entries(1.0)}
+    entries = {e.title for e in probing_entries(Probed(1.0, 1.0, 1.0))}
     assert entries == {n for n, e in effects("probing").items() if e.candidate}
     assert "gravity" not in entries

@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 
 from tissuejax.diagnosis.bench import Candidate, Free
 from tissuejax.effects.catalogue import effects
-from tissuejax.effects.effect import Effect
-from tissuejax.effects.form import Form, Offer, Sizes
+from tissuejax.effects.form import Offer, Sizes
 from tissuejax.model import Model
 from tissuejax.parameters import Parameter
 
@@ -21,18 +20,13 @@ SPREAD = math.log(5.0)  # standard deviation of the logarithm of what has a limi
 
 
 @dataclass(frozen=True)
-class Entry:
-    """An effect with its forms, simple to full, and the name under which it is reported (`effects.form.Offer`)."""
-
-    effect: Effect
-    forms: tuple[Form, ...]
-    title: str
-    simple: Effect | None = None
+class Entry(Offer):
+    """What an effect offers, under the name by which it is reported, to be declared to a bench."""
 
     @classmethod
     def of(cls, offer: Offer) -> "Entry":
-        """What an effect offers."""
-        return cls(offer.effect, offer.forms, offer.title or offer.effect.name, offer.simple)
+        """Of what an effect offers."""
+        return cls(**{**vars(offer), "title": offer.title or offer.effect.name})
 
     @property
     def searches(self) -> bool:
@@ -80,6 +74,11 @@ class Entry:
         times = [p for p in free if p.startswith(f"{prefix}.tau") and p[-1].isdigit()]
         for path in times:  # which time is called the first means nothing
             free[path] = functools.reduce(wider, (free[p] for p in times), free[path])
+        for path, f in free.items():
+            name = path.split(".")[2]
+            lower, upper, start[path] = self.ranges.get(name, (f.lower, f.upper, start[path]))
+            scale, prior = self.scales.get(name, f.scale), self.priors.get(name, f.prior)
+            free[path] = replace(f, lower=lower, upper=upper, scale=scale, prior=prior)
         for i, c in enumerate(candidates):
             beside = [candidates[j].key for j in range(len(candidates)) if self.near(i, j)]
             candidates[i] = replace(c, beside=tuple(beside))

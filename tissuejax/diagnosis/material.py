@@ -34,7 +34,6 @@ from tissuejax.model import Model
 from tissuejax.recordings.recording import Sample
 
 STRESS_CHANNEL = "nominal_stress"
-CYCLES = 2.5  # periods that the longest recording must hold to show one
 SHORTEST = 128  # samples that a series is lengthened to
 STEP = 1e-6  # of a parameter's scale
 SIZE = 10.0  # by which the base's defaults may be off before they are brought to size
@@ -129,6 +128,7 @@ class MaterialBench(Bench):
             force=top * float(np.nanmax([*(t.area for t in tests.values()), 1e-6])) or 1.0,
             session=max(ends),
             recording=max(float(np.ptp(t.time)) for t in tests.values()),
+            step=max(float(np.median(np.diff(s.time))) for s in segments),
         )
         bench.sizes = sizes
         found = [e for e in entries(sizes) if names is None or e.title in names]
@@ -141,17 +141,6 @@ class MaterialBench(Bench):
         """Whether the base model, known physics included, knows no direction."""
         acting = {p.split(".")[1] for p in (*self.known, *self.base) if p.startswith("effects.")}
         return self._energy.isotropic and all(e.effect.isotropic for e in self._entries if e.effect.name in acting)
-
-    def elsewhere(self, values: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
-        """Specimens cut along two axes allow several directions of the fibres; see `Bench.elsewhere`."""
-        paths = [p for p in values if p in ("effects.anisotropy.angle", "effects.anisotropy.spread")]
-        if not paths:
-            return ()
-        fresh = {
-            "effects.anisotropy.k2": self.candidates["anisotropy/in the xy plane"].grid[0]["effects.anisotropy.k2"]
-        }
-        angles = [(2 * k + 1) * np.pi / 8 for k in range(4)]
-        return [fresh | {p: a if p.endswith("angle") else 0.4 for p in paths} for a in angles]
 
     def _declare(self, energy: Energy, found: list[Entry]) -> None:
         recordings = (*self.fitted, *self.held_out)
@@ -188,12 +177,6 @@ class MaterialBench(Bench):
             self.free.update(free)
             self.start.update(start)
             self.candidates.update({c.key: c for c in candidates})
-        if (path := "effects.periodic.frequency") in self.free:
-            longest = max(s.time[-1] - s.time[0] for s in self.segments)
-            step = max(float(np.median(np.diff(s.time))) for s in self.segments)
-            lower, upper = CYCLES / longest, max(0.25 / step, 2 * CYCLES / longest)
-            self.free[path] = replace(self.free[path], lower=lower, upper=upper)
-            self.start[path] = 2 * lower
         self._amplitudes = {p for c in self.candidates.values() for p in c.amplitudes}
 
     def _size_up(self) -> None:

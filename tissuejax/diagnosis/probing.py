@@ -17,7 +17,6 @@ it passed for a slope in the bulk modulus, whose steps came out three times too 
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +31,7 @@ from tissuejax.diagnosis.probing_runs import COARSE, FINE, RETIMED, ROUGH, Runs
 from tissuejax.diagnosis.probing_series import calmed, kept_samples, series
 from tissuejax.diagnosis.probing_slopes import Slopes
 from tissuejax.effects.catalogue import effects
+from tissuejax.effects.form import Probed
 from tissuejax.energies.catalogue import volumetric
 from tissuejax.energies.energy import Energy
 from tissuejax.experiments.predictor import predictor
@@ -43,7 +43,6 @@ from tissuejax.recordings.recording import Sample
 # named as a tissue 4 % thinner; with these the true constants leave 1.07 in chi-square of the force and not 1.72.
 MESH = (22, 22, 8)
 STEP_OF_SCALE, LOG_STEP = 0.15, 0.04  # of a parameter's scale; of its logarithm
-AGED = 0.5  # standard deviation of the logarithm of stiffness at the end of a session
 COLUMN = 0.5  # step of a score's column, of the amplitude's scale
 
 
@@ -111,7 +110,7 @@ class ProbingBench(Bench):
             self.start[path] = p.default
         self.base = tuple(self.free)
         guess = self.model.energy.initial_shear_modulus({p.split(".")[1]: v for p, v in self.start.items()})
-        every = {e.effect.name: e.effect for e in probing_entries(1.0)}
+        every = {e.effect.name: e.effect for e in probing_entries(Probed(1.0, 1.0, 1.0))}
         lone = {n: e() for n, e in effects("probing").items() if n not in every}  # only ever stated
         self.runs.effects = every | lone
         ratio = self._scale()
@@ -119,20 +118,13 @@ class ProbingBench(Bench):
             self.start[path] *= ratio if self.free[path].unit == "Pa" else 1.0
         tests = [setup.test for setup in self.ready.setups.values()]
         session = max(float(t.start) for t in tests) + max(float(np.max(s.time)) for s in self.segments)
-        priors = {"aging.rate": AGED / session}
         mu, height = ratio * float(guess), float(max(t.height for t in tests))
-        # a base gives way by as much as the tissue over it: no fixed length a pascal is small for soft and stiff alike
-        scales = {"base-slip.compliance": 0.2 * height / mu, "base-slip.fluidity": 0.04 * height / mu}
-        found = probing_entries(0.1 * mu)
+        found = probing_entries(Probed(mu, height, session))
         entries = [e for e in found if names is None or e.effect.name in names]
         whole = Model(self.model.energy, None, tuple(e.effect for e in entries)).across(recordings)
         self.entries: dict[str, Entry] = {e.effect.name: e for e in entries}
         for entry in entries:
             free, start, candidates = entry.declare(whole, self.fitted, self.held_out)
-            for path, f in free.items():
-                generic = ".".join(path.split(".")[1:3])
-                prior = (0.0, priors[generic]) if generic in priors else f.prior
-                free[path] = replace(f, scale=scales.get(generic, f.scale), prior=prior)
             self.free.update(free)
             self.start.update(start)
             self.candidates.update({c.key: c for c in candidates})

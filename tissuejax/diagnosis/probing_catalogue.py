@@ -8,15 +8,12 @@ from jaxtyping import Float
 
 from tissuejax.diagnosis.catalogue import Entry
 from tissuejax.effects.catalogue import effects
+from tissuejax.effects.form import Probed
 
 
-def probing_entries(energy: float) -> list[Entry]:
-    """All effects that act in probings, in their forms.
-
-    Args:
-        energy: typical strain energy under the probe, Pa.
-    """
-    return [Entry.of(kind.in_probings(energy)) for kind in effects("probing").values() if kind.candidate]
+def probing_entries(sizes: Probed) -> list[Entry]:
+    """All effects that act in probings, in their forms."""
+    return [Entry.of(kind.in_probings(sizes)) for kind in effects("probing").values() if kind.candidate]
 
 
 def places(

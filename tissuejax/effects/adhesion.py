@@ -6,7 +6,7 @@ from typing import ClassVar
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
-from tissuejax.effects.form import Form, Offer
+from tissuejax.effects.form import Form, Offer, Probed
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.tled.scene import Scene
@@ -30,7 +30,7 @@ class Adhesion(Effect):
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"reach": (1e-4, 3e-4)}
 
     @classmethod
-    def in_probings(cls, energy: float) -> Offer:
+    def in_probings(cls, sizes: Probed) -> Offer:
         """See `Effect.in_probings`."""
         return Offer(cls(), (Form("", ("strength", "reach"), {"reach": (1e-4, 3e-4, 8e-4)}),))
 

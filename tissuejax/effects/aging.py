@@ -7,12 +7,14 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
-from tissuejax.effects.form import Form, Offer, Sizes
+from tissuejax.effects.form import Form, Offer, Probed, Sizes
 from tissuejax.effects.history import dying
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.recordings.recording import Channel
+
+AGED = 0.5  # standard deviation of the logarithm of stiffness at the end of a session
 
 
 class Aging(Effect):
@@ -50,9 +52,9 @@ class Aging(Effect):
         return Offer(cls(), forms)
 
     @classmethod
-    def in_probings(cls, energy: float) -> Offer:
+    def in_probings(cls, sizes: Probed) -> Offer:
         """See `Effect.in_probings`."""
-        return Offer(cls(), (Form("", ("rate",)),))
+        return Offer(cls(), (Form("", ("rate",)),), priors={"rate": (0.0, AGED / sizes.session)})
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

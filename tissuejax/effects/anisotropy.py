@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
-from tissuejax.effects.form import Form, Offer, Sizes
+from tissuejax.effects.form import Form, Offer, Probed, Sizes
 from tissuejax.energies.barrier import expm1
 from tissuejax.energies.strain import Strain
 from tissuejax.parameters import Parameter
@@ -74,7 +74,7 @@ class Anisotropy(Effect):
         return Offer(cls(families=2, crimped=True), forms, simple=cls())  # a second family costs half as much again
 
     @classmethod
-    def in_probings(cls, energy: float) -> Offer:
+    def in_probings(cls, sizes: Probed) -> Offer:
         """See `Effect.in_probings`."""
         return Offer(cls(), (Form("", ("k1", "angle"), {"angle": tuple(np.arange(4) * np.pi / 4)}),))
 

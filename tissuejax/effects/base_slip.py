@@ -1,11 +1,13 @@
 """The support does not hold the tissue: its base gives way or slides."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import ClassVar
 
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import Offer, Probed
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.tled.scene import Scene
@@ -28,6 +30,15 @@ class BaseSlip(Effect):
     words: ClassVar[tuple[str, ...]] = ("the base slips by {compliance} under shear", "and creeps by {fluidity}")
     source: ClassVar[str] = "Newtonian or elastic interlayer; the source fixes the base (Lister 2012, 2.2.4)"
     amplitudes: ClassVar[tuple[str, ...]] = ("compliance", "fluidity")
+
+    @classmethod
+    def in_probings(cls, sizes: Probed) -> Offer:
+        """See `Effect.in_probings`.
+
+        A base gives way by as much as the tissue over it: no fixed length a pascal is small for soft and stiff alike.
+        """
+        soft = sizes.height / sizes.modulus
+        return replace(Offer.whole(cls()), scales={"compliance": 0.2 * soft, "fluidity": 0.04 * soft})
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

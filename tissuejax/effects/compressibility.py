@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
-from tissuejax.effects.form import Form, Offer, Sizes
+from tissuejax.effects.form import Form, Offer, Probed, Sizes
 from tissuejax.effects.history import fading
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.effects.probing_test import ProbingTest
@@ -54,7 +54,7 @@ class Compressibility(Effect):
         return Offer(cls(), (Form("", free, dict(cls.grid)), other))
 
     @classmethod
-    def in_probings(cls, energy: float) -> Offer:
+    def in_probings(cls, sizes: Probed) -> Offer:
         """See `Effect.in_probings`."""
         return Offer(cls(), (Form("draining", ("drained", "time"), {"time": (4.0,)}),))
 

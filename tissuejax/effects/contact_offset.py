@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
-from tissuejax.effects.form import Form, Offer
+from tissuejax.effects.form import Form, Offer, Probed
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.tled.scene import Scene
@@ -36,7 +36,7 @@ class ContactOffset(Effect):
     separate: bool = False
 
     @classmethod
-    def in_probings(cls, energy: float) -> Offer:
+    def in_probings(cls, sizes: Probed) -> Offer:
         """See `Effect.in_probings`."""
         each = Form("each recording", ("depth",), each=("depth",))
         return Offer(cls(separate=True), (Form("delay", ("delay",)), Form("depth", ("depth",)), each))

@@ -13,7 +13,7 @@ import equinox as eqx
 from jaxtyping import Array, Float
 
 from tissuejax.effects.cutting_test import Cut
-from tissuejax.effects.form import Offer, Sizes
+from tissuejax.effects.form import Offer, Probed, Sizes
 from tissuejax.effects.material_test import MaterialTest, Stress
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.energies.strain import Strain
@@ -101,8 +101,8 @@ class Effect(eqx.Module):
         return Offer.whole(cls())
 
     @classmethod
-    def in_probings(cls, energy: float) -> Offer:
-        """The same of probings; `energy` is the typical strain energy under the probe, Pa."""
+    def in_probings(cls, sizes: Probed) -> Offer:
+        """The same of probings."""
         return Offer.whole(cls())
 
     @property

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
-from tissuejax.effects.form import Form, Offer, Sizes
+from tissuejax.effects.form import Form, Offer, Probed, Sizes
 from tissuejax.energies.barrier import expm1
 from tissuejax.energies.strain import Strain
 from tissuejax.parameters import Parameter
@@ -65,7 +65,7 @@ class EnergyForm(Effect):
         )  # principal stretches cost as much as all the rest
 
     @classmethod
-    def in_probings(cls, energy: float) -> Offer:
+    def in_probings(cls, sizes: Probed) -> Offer:
         """See `Effect.in_probings`."""
         return Offer(cls(terms=("C30", "C01")), (Form("", ("C30", "C01")),))
 

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
-from tissuejax.effects.form import Form, Offer
+from tissuejax.effects.form import Form, Offer, Probed
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.recordings.recording import Channel
@@ -37,7 +37,7 @@ class ForceDrift(Effect):
     separate: bool = False
 
     @classmethod
-    def in_probings(cls, energy: float) -> Offer:
+    def in_probings(cls, sizes: Probed) -> Offer:
         """See `Effect.in_probings`."""
         axes = cls.amplitudes
         return Offer(cls(separate=True), (Form("", axes), Form("each recording", axes, each=axes)))

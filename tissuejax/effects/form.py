@@ -49,7 +49,8 @@ class Sizes:
         strain: largest |ln stretch|: exponents of exponential terms bend within it.
         force: largest force, N: a rig stiffens within it.
         session: time from the first recording to the last, s: drifts die out within it.
-        recording: duration of one, s.
+        recording: duration of the longest, s.
+        step: between samples, the longest, s: faster than that nothing is seen.
     """
 
     energy: float
@@ -57,11 +58,32 @@ class Sizes:
     force: float
     session: float
     recording: float
+    step: float = 0.1
 
     @property
     def stretched(self) -> float:
         """The largest squared stretch less 1."""
         return math.expm1(2 * self.strain)
+
+
+@dataclass(frozen=True)
+class Probed:
+    """The same of probings.
+
+    Attributes:
+        modulus: shear modulus of the tissue, as its force says, Pa.
+        height: of the tissue, m.
+        session: from the first recording to the end of the last, s.
+    """
+
+    modulus: float
+    height: float
+    session: float
+
+    @property
+    def energy(self) -> float:
+        """Typical strain energy under the probe, Pa."""
+        return 0.1 * self.modulus
 
 
 @dataclass(frozen=True)
@@ -73,12 +95,18 @@ class Offer:
         forms: simple to full.
         title: the name under which it is reported; its own by default.
         simple: the effect without what makes every prediction a search, for sets that don't use that.
+        scales: by parameter, a step that is plainly visible here, where that is not the declared one.
+        priors: by parameter, mean and standard deviation of what it may be here.
+        ranges: by parameter, (lower, upper, start) of what can be seen here.
     """
 
     effect: "Effect"
     forms: tuple[Form, ...]
     title: str = ""
     simple: "Effect | None" = None
+    scales: Mapping[str, float] = field(default_factory=dict)
+    priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    ranges: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
 
     @classmethod
     def whole(cls, effect: "Effect") -> "Offer":

@@ -6,7 +6,7 @@ from typing import ClassVar
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
-from tissuejax.effects.form import Form, Offer
+from tissuejax.effects.form import Form, Offer, Probed
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.tled.scene import Scene
@@ -35,7 +35,7 @@ class Friction(Effect):
     amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
 
     @classmethod
-    def in_probings(cls, energy: float) -> Offer:
+    def in_probings(cls, sizes: Probed) -> Offer:
         """See `Effect.in_probings`."""
         # where the surface sticks, a rigid stick of weak friction passes for a giving one of strong friction
         grid = {"coefficient": (0.45,), "give": (2e-8,)}  # m/Pa: 500 Pa move by 10 micrometres

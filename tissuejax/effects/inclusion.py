@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
-from tissuejax.effects.form import Form, Offer
+from tissuejax.effects.form import Form, Offer, Probed
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.tled.scene import Scene
@@ -36,7 +36,7 @@ class Inclusion(Effect):
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"radius": (3e-3, 5e-3, 8e-3)}
 
     @classmethod
-    def in_probings(cls, energy: float) -> Offer:
+    def in_probings(cls, sizes: Probed) -> Offer:
         """See `Effect.in_probings`."""
         round_ = ("contrast", "x", "y", "z", "radius")
         flat = Form("flat", (*round_, "flatness"), nominated=False)

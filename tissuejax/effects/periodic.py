@@ -12,6 +12,8 @@ from tissuejax.effects.form import Form, Offer, Sizes
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.parameters import Parameter
 
+CYCLES = 2.5  # periods that the longest recording must hold to show one
+
 
 class Periodic(Effect):
     """Reported stress = stress + sin a(t) `sin` + cos a(t) `cos`, a = 2 pi frequency t.
@@ -49,7 +51,9 @@ class Periodic(Effect):
             Form("", ("sin", "cos", "frequency"), each=("sin", "cos")),
             Form("two harmonics", (*both, "frequency"), nominated=False, each=both),
         )
-        return Offer(cls(separate=True), forms)
+        lower = CYCLES / sizes.recording
+        upper = max(0.25 / sizes.step, 2 * lower)
+        return Offer(cls(separate=True), forms, ranges={"frequency": (lower, upper, 2 * lower)})
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
-from tissuejax.effects.form import Form, Offer
+from tissuejax.effects.form import Form, Offer, Probed
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.recordings.recording import Channel
@@ -48,7 +48,7 @@ class Registration(Effect):
     order: ClassVar[int] = 0
 
     @classmethod
-    def in_probings(cls, energy: float) -> Offer:
+    def in_probings(cls, sizes: Probed) -> Offer:
         """See `Effect.in_probings`."""
         alone = (Form(name, (name,)) for name in ("turn", "radius", "thickness"))
         return Offer(cls(), (Form("place", ("dx", "dy")), *alone))

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
-from tissuejax.effects.form import Form, Offer, Sizes
+from tissuejax.effects.form import Form, Offer, Probed, Sizes
 from tissuejax.effects.history import running_peak
 from tissuejax.effects.material_test import MaterialTest, Stress
 from tissuejax.effects.probing_test import ProbingTest
@@ -58,9 +58,9 @@ class Softening(Effect):
         return Offer(cls(loading=True), forms)
 
     @classmethod
-    def in_probings(cls, energy: float) -> Offer:
+    def in_probings(cls, sizes: Probed) -> Offer:
         """See `Effect.in_probings`."""
-        return Offer(cls(), (Form("", ("r", "m"), {"m": (0.05 * energy, 0.4 * energy)}),))
+        return Offer(cls(), (Form("", ("r", "m"), {"m": (0.05 * sizes.energy, 0.4 * sizes.energy)}),))
 
     def __check_init__(self):
         if self.law not in LAWS:

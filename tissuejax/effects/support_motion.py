@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
-from tissuejax.effects.form import Form, Offer
+from tissuejax.effects.form import Form, Offer, Probed
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.tled.scene import Scene
@@ -40,7 +40,7 @@ class SupportMotion(Effect):
     separate: bool = True
 
     @classmethod
-    def in_probings(cls, energy: float) -> Offer:
+    def in_probings(cls, sizes: Probed) -> Offer:
         """See `Effect.in_probings`."""
         waves = cls.amplitudes
         return Offer(cls(), (Form("", (*waves, "lean_x", "lean_y", "frequency"), each=waves),))

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 from tissuejax.effects.cutting_test import Cut
 from tissuejax.effects.effect import Effect
-from tissuejax.effects.form import Form, Offer, Sizes
+from tissuejax.effects.form import Form, Offer, Probed, Sizes
 from tissuejax.effects.history import fading
 from tissuejax.effects.material_test import MaterialTest, Stress
 from tissuejax.effects.probing_test import ProbingTest
@@ -84,7 +84,7 @@ class Viscoelasticity(Effect):
         return Offer(cls(terms=3), forms)
 
     @classmethod
-    def in_probings(cls, energy: float) -> Offer:
+    def in_probings(cls, sizes: Probed) -> Offer:
         """See `Effect.in_probings`."""
         one = Form("one time", ("g1", "tau1"), {"tau1": (0.4, 4.0)}, nominated=False)
         return Offer(
