@@ -64,7 +64,7 @@ def test_what_an_effect_says_of_itself_is_what_it_does(name):
 
 
 def test_ranges_and_priors_follow_from_the_recordings():
-    """2.5 periods in 40 s to a quarter of the sampling rate; stiffness that ages by half in the session; a base that gives
+    """2.5 periods in 40 s to a quarter of the sampling rate; ageing by half in the session; a base that gives
     way by a fifth of what the tissue over it does."""
     assert OFFERS["homogeneous", "periodic"].ranges["frequency"] == pytest.approx((2.5 / 40, 0.25 / 0.05, 5 / 40))
     assert OFFERS["probing", "aging"].priors["rate"] == pytest.approx((0.0, 0.5 / 400))
