@@ -119,3 +119,15 @@ def test_a_stress_that_was_set_is_no_saturated_sensor(tmp_path):
     sample = read(tmp_path / "my.toml")
     (said,) = [s for s in slips(sample, tuple(sample.recordings)) if "exactly" in s]
     assert "creep" in said
+
+
+def test_the_template_of_a_cut_is_a_side_file_that_reads(tmp_path, capsys):
+    assert main(["import", "--template", "cutting", str(tmp_path / "my.toml")]) == 0
+    t = np.linspace(0, 1, 30)
+    rows = [f"{a},{20 * a},{0.1 * a},0,{9}" for a in t]
+    written(tmp_path / "my.csv", "t,x,Fx,Fz,deep", *rows)
+    sample = read(tmp_path / "my.toml")
+    (r,) = sample.recordings.values()
+    assert r.experiment == "cutting"
+    assert r.attributes["blade/thickness"] == pytest.approx(0.365e-3)
+    np.testing.assert_allclose(np.ptp(np.asarray(r.inputs["blade/tip"]), axis=0).max(), 20e-3)

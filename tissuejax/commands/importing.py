@@ -10,6 +10,7 @@ from tissuejax.commands.command import Command, Reply
 from tissuejax.errors import InputError
 from tissuejax.mesh import probing_files
 from tissuejax.mesh.probing_files import describes_a_body, probing_sample
+from tissuejax.recordings import cutting_table
 from tissuejax.recordings.files import names, read, write
 from tissuejax.recordings.guessing import Guess, guessed
 from tissuejax.recordings.layouts import layout
@@ -20,6 +21,12 @@ from tissuejax.units import quantity
 
 # The example at the top of mesh/probing_files.py is the template: there is one text to keep right.
 PROBE = "\n".join(line[4:] for line in probing_files.__doc__.splitlines() if line.startswith("    ")) + "\n"
+# So is that of recordings/cutting_table.py; its profile names a file that may not be there.
+CUT = 'file = "my.csv"\nsample = "s1"\nrecording = "pass-1"\n' + "\n".join(
+    f"# {line}" if line.startswith("profile") else line
+    for line in cutting_table.__doc__[cutting_table.__doc__.index("experiment") :].splitlines()
+)
+WHOLE = {"probe": PROBE, "cutting": CUT + "\n", "cut": CUT + "\n"}  # templates of files with more than columns
 SIZES = ("height", "diameter", "width", "thickness", "area", "radius")
 
 
@@ -42,7 +49,7 @@ guessed; what was assumed is said, and stands as comments in the side file, whic
 machines, rheometers and indenters are recognised by their content.
 
   tissuejax import --template tension                      an empty side file to fill in (also compression, planar,
-                                                           equibiaxial, biaxial, simple-shear, probing, probe)
+                                                           equibiaxial, biaxial, simple-shear, probing, probe, cutting)
   tissuejax import probe.toml                              a probing: surface (STL), probe path, force, markers
   tissuejax import my.toml my.h5                           a recording file (HDF5) from a side file
   tissuejax import specimens.toml out/                     one recording file for each sample of it
@@ -89,7 +96,7 @@ machines, rheometers and indenters are recognised by their content.
 
 
 def _template(given: argparse.Namespace) -> Reply:
-    text = PROBE if given.template == "probe" else template(given.template)
+    text = WHOLE.get(given.template) or template(given.template)
     out = given.out or (Path(given.file) if given.file else None)
     if out is None:
         return Reply({"template": text}, text.rstrip())

@@ -196,7 +196,7 @@ def template(kind: str) -> str:
     """
     kind = kind if kind in TEMPLATES else EXPERIMENT_WORDS.get(kind, (kind, ""))[0]
     if kind not in TEMPLATES:
-        raise InputError(f"--template {kind}: there is one for {', '.join(TEMPLATES)} and probe")
+        raise InputError(f"--template {kind}: there is one for {', '.join(TEMPLATES)}, probe and cutting")
     experiment, positive, columns, sizes = TEMPLATES[kind]
     lines = [f"# A side file for a table of a {kind} test. Put your own names, units and sizes; '#' begins a comment."]
     lines.append("# `tissuejax import my.csv` looks at a table and writes such a file by itself.")
