@@ -100,3 +100,20 @@ def test_what_is_refused(side, words, tmp_path):
     for word in words:
         assert word in str(refused.value), str(refused.value)
     assert refused.value.exit_code == 2
+
+
+def test_import_writes_a_side_file_with_lines_to_fill_in(tmp_path, capsys):
+    from tissuejax.cli import main
+
+    (tmp_path / "cut.csv").write_text(ROWS.replace("t,x,F,Fz,d", "time_s,displacement_mm,force_N,Fz_N,depth_mm"))
+    assert main(["import", str(tmp_path / "cut.csv"), "--experiment", "cutting"]) == 2
+    side = tmp_path / "cut.toml"
+    with pytest.raises(InputError, match=r"tissue.length: found \"\?\""):
+        files.read(side)
+    text = side.read_text()
+    for key, value in (("length", "30 mm"), ("width", "20 mm"), ("height", "10 mm"), ("thickness", "0.4 mm")):
+        text = text.replace(f'{key} = "?"', f'{key} = "{value}"')
+    side.write_text(text.replace('depth = "?"', 'depth = "4 mm"'))
+    r = files.read(side).recordings["r1"]
+    np.testing.assert_allclose(r.inputs["blade/tip"][:, 0], (np.arange(20) - 2) * 1e-3)
+    np.testing.assert_allclose(r.channels["force"].values[:, 0], np.maximum(0, np.arange(20) - 2) * 0.01)

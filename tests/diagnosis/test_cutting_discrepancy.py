@@ -14,12 +14,13 @@ NOISE, DEPTH = 0.001, 0.008
 
 
 def made(toughness, drift=lambda name, t: 0.0 * t):
-    """Three strokes there and half the way back. Their force is parting alone, toughness(name, x) by depth: tissue so
-    soft that it neither wedges nor rubs; it sets in over 0.3 mm."""
+    """Three strokes there and half the way back, without friction: toughness(name, x) where tissue is parted, and a
+    layer that takes 1 N/m and gives it back; both set in over 0.3 mm."""
     rng, out = np.random.default_rng(5), []
     for name, speed in (("slow", 2e-3), ("middle", 5e-3), ("quick", 2e-2)):
         time, x = strokes(-0.003, 0.028, 0.014, speed=speed, rate=160 * speed / 0.031)
-        parting = np.where(np.gradient(x) > 0, toughness(name, x) * (1 - np.exp(-np.clip(x, 0, None) / 3e-4)), 0.0)
+        setting_in = 1 - np.exp(-np.clip(x, 0, None) / 3e-4)
+        parting = (1.0 + np.where(np.gradient(x) > 0, toughness(name, x), 0.0)) * setting_in
         force = DEPTH * parting + drift(name, time) + NOISE * rng.standard_normal(len(x))
         out.append(record(name, time, x, force, depth=DEPTH, noise=NOISE))
     return sample(*out)

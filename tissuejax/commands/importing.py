@@ -132,7 +132,8 @@ def _said(guess: Guess, side: Path, given: argparse.Namespace) -> Reply:
     if guess.lacking:
         options = " ".join(f"--{name} ..." for name in guess.lacking)
         lines += ["", f"wrote {side}, which still needs: {', '.join(guess.lacking)}. Write them into the lines marked"]
-        lines.append(f"FILL IN, or give them now: tissuejax import {table} {options} --force")
+        now = f", or give them now: tissuejax import {table} {options} --force"
+        lines.append("FILL IN" + (", and look at what each column is." if guess.experiment == "cutting" else now))
         return Reply(record, "\n".join(lines), 2)
     for name in names(side):
         sample = read(side, name)

@@ -65,6 +65,11 @@ def setup_from(tissue: Mapping[str, object], blade: Mapping[str, object]) -> Set
         for key in needed:
             if key not in table:
                 raise InputError(f'{name}.{key}: found nothing, expected a length, e.g. "12 mm"')
+    for key, value in (
+        (f"{t}.{k}", v) for t, table in (("tissue", tissue), ("blade", blade)) for k, v in table.items()
+    ):
+        if value == "?":
+            raise InputError(f'{key}: found "?", expected a length: measure it and write it here, e.g. "12 mm"')
     sizes = {k: quantity(v, "m", f"tissue.{k}") for k, v in tissue.items()}
     given = {k: quantity(v, BLADE[k], f"blade.{k}") for k, v in blade.items() if k in BLADE}
     for key, value in (sizes | {k: v for k, v in given.items() if k != "notch"}).items():

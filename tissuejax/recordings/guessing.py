@@ -9,6 +9,7 @@ import numpy as np
 
 from tissuejax.errors import InputError
 from tissuejax.recordings.columns_guessed import Guessed, backwards, chosen_pairs, chosen_time, told, understood
+from tissuejax.recordings.cutting_table import TISSUE
 from tissuejax.recordings.delimited import Columns, text_lines
 from tissuejax.recordings.exports import text
 from tissuejax.recordings.exports.export import BLOCK, Exported, TableExport, export_named, recognised, stacked
@@ -270,6 +271,8 @@ def _signs(
     pressed: bool,
 ) -> tuple[dict[str, int], str, list[str]]:
     """Sign of each column, which sense counts positive, and what was assumed."""
+    if experiment == "cutting":  # its place and its force are read as they stand, either sign
+        return {}, "tension", []
     pair = pairs[0][0]
     motion, load = pair[0], pair[len(pair) // 2]
     x, y = numbers[motion.column], numbers[load.column]
@@ -307,7 +310,7 @@ def _zeros(
 ) -> tuple[str, ...]:
     """Displacements that don't start at zero; what is done about them is added to `said`."""
     found = []
-    for pair, _ in pairs:
+    for pair, _ in pairs if experiment != "cutting" else ():
         for guess in pair:
             values = numbers[guess.column][np.isfinite(numbers[guess.column])]
             if guess.quantity not in ("displacement", "force") or not len(values) or not np.ptp(values):
@@ -328,6 +331,8 @@ def _needed(pairs: list[tuple[list[Guessed], str]], experiment: str, known: Mapp
     """The sizes known, and "?" for those that the columns need."""
     used = {g.quantity for pair, _ in pairs for g in pair}
     needed = {}
+    if experiment == "cutting":
+        return dict.fromkeys((*TISSUE, "thickness", "depth"), "?")
     if experiment == "probing":
         needed["radius"] = known.get("radius", "?")
         return {k: v for k, v in known.items() if k in ("height", "radius")} | needed

@@ -19,10 +19,23 @@ COMMENTS = {
     "comment": "no line is a comment",
     "sample": "one name, or {column} for one sample a value",
     "recording": "one name, or {column} for one recording a value",
-    "experiment": "tension, compression, planar, equibiaxial, biaxial, simple-shear, probing",
+    "experiment": "tension, compression, planar, equibiaxial, biaxial, simple-shear, probing, cutting",
     "positive": "whether tension or compression counts positive in the table",
     "missing": "rows with empty cells are left out",
 }
+CUT = """
+[tissue]
+length = "?"                                  # FILL IN: along the cut
+width = "?"                                   # FILL IN: across it; the blade runs in the middle
+height = "?"                                  # FILL IN
+
+[blade]
+thickness = "?"                               # FILL IN, e.g. "0.365 mm"
+depth = "?"                                   # FILL IN: of the cut; or a column, depth = { column = ..., unit = ... }
+# angle = "28 deg"                            # between the bevels, 30 degrees if not given
+# profile = { file = "edge.csv", unit = "mm" }   # x and z of the edge from the tip up; straight if not given
+# notch = "10 mm"                             # how far the cut reached before (a second pass)
+"""
 _SIZES = {
     "height": "undeformed length in the loaded direction, between the grips or platens",
     "diameter": "of a round specimen",
@@ -72,7 +85,9 @@ def side_text(guess: Guess, file: str) -> str:
         lines += _pair(guess, guess.pairs[0][0])
     if guess.unused:
         lines.append(f"# not used: {', '.join(guess.unused)}")
-    if guess.specimen:
+    if guess.experiment == "cutting":
+        lines += CUT.rstrip().splitlines()
+    elif guess.specimen:
         lines += ["", "[specimen]"]
         for size, value in guess.specimen.items():
             mark = "FILL IN: " if value == "?" else ""
