@@ -38,4 +38,7 @@ def test_relaxation_and_slack_are_found_together(rng):
     assert {e["name"] for e in told["effects"]} == {"viscoelasticity", "slack"}
     gap = next(e for e in told["effects"] if e["name"] == "slack")["parameters"]["effects.slack.gap"]
     assert abs(gap["value"] - GAP) < 4 * gap["std"] < 0.008
+    left = {k: told[k]["r1"]["nominal_stress"]["rmse"] ** 2 - NOISE**2 for k in ("before", "after")}
+    assert abs(told["explained"]["fitted"] - (1 - max(left["after"], 0) / left["before"])) < 0.01  # 0 when nothing is
+    assert told["explained"]["held_out"] is None  # held out, and the fitted recordings' share was that of those
     assert abs(told["base_parameters"]["energy.mu"]["after"] - MU) < 0.05 * MU

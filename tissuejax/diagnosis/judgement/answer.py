@@ -108,7 +108,7 @@ class Answered:
         """
         bench = self.bench
         inside, outside = (
-            (self._beyond(f, names) for f in (self.empty, self.chosen)) for names in (bench.fitted, bench.held_out)
+            [self._beyond(f, names) for f in (self.empty, self.chosen)] for names in (bench.fitted, bench.held_out)
         )
         return _share(*inside), _share(*outside)
 
