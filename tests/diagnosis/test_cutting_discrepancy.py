@@ -20,7 +20,7 @@ def made(toughness, drift=lambda name, t: 0.0 * t):
     for name, speed in (("slow", 2e-3), ("middle", 5e-3), ("quick", 2e-2)):
         time, x = strokes(-0.003, 0.028, 0.014, speed=speed, rate=160 * speed / 0.031)
         setting_in = 1 - np.exp(-np.clip(x, 0, None) / 3e-4)
-        parting = (1.0 + np.where(np.gradient(x) > 0, toughness(name, x), 0.0)) * setting_in
+        parting = (1.0 + np.where(np.diff(x, prepend=x[0] - 1e-6) > 0, toughness(name, x), 0.0)) * setting_in
         force = DEPTH * parting + drift(name, time) + NOISE * rng.standard_normal(len(x))
         out.append(record(name, time, x, force, depth=DEPTH, noise=NOISE))
     return sample(*out)
