@@ -243,7 +243,7 @@ def test_a_box_too_wide_for_the_memory_of_stress_is_refused():
 def test_a_failed_site_says_place_and_depth(monkeypatch):
     from tissuejax.errors import NotConverged
 
-    monkeypatch.setattr(ramps, "MOST", 25)
+    monkeypatch.setattr(ramps, "MOST_STEPS", 25)
     with pytest.raises(NotConverged, match=r"place \(1.0, 2.0\) mm, depth"):
         ramps.ramp(made.matter(), made.SMALL, [1e-3, 2e-3], 0.018, [1e-3])
 
