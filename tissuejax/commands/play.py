@@ -76,7 +76,8 @@ A loop without permission for real-time priority runs and says so. A direct scen
         if given.seconds is not None and not 0 <= given.seconds < np.inf:
             raise InputError(f"--seconds {given.seconds:g}: wanted is 0 or more")
         if given.direct:
-            return _direct(given, native.wanted())
+            with native.preferred() as in_c:
+                return _direct(given, in_c)
         if given.source is None:
             raise InputError("which FILE? make one with `tissuejax precompute`, or use --direct")
         if _is_run(given.source):
