@@ -5,10 +5,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from tests.cutting import slabs
 from tests.surrogate import made
 from tissuejax.errors import InputError
 from tissuejax.play.stored import Run, RunSession
 from tissuejax.surrogate.live.direct import direct_scene
+from tissuejax.tled import simulate
 from tissuejax.tled.stream import run_to_file
 
 
@@ -58,3 +60,17 @@ def test_a_file_without_states_is_refused(path, tmp_path):
             del file[f"states/displacement/{k}"]
     with pytest.raises(InputError, match="1 states at 4 times"):
         Run(short)
+
+
+def test_a_cutting_plays_back_with_the_force_on_its_blade(tmp_path):
+    scene = slabs.cut(strength=3000.0, frames=24)
+    seen = simulate.run(scene)
+    run = Run(run_to_file(scene, tmp_path / "cut.h5", chunk=6))
+    assert len(run.times) == 4
+    np.testing.assert_allclose(run.force, np.asarray(seen.force), rtol=1e-6, atol=1e-9)
+    assert np.min(run.force[:, 0]) < -1e-4  # the tissue holds the blade back
+    opened = np.ptp([run.states[k][:, 1] for k in (0, -1)], axis=0).max()
+    assert opened > 2e-4  # and is open where the blade has passed
+    session = RunSession(run, "a cut")
+    session.advance(0.5 * (run.times[-1] - run.times[0]))
+    assert np.isfinite(np.frombuffer(session.frame(1), "<f4")).all()

@@ -142,7 +142,7 @@ def test_a_gradient_method_takes_as_many_steps_as_it_says(rng, method, steps):
 
 def test_numbers_in_the_sentences_on_a_cut_s_resolution():
     """Strength from which the flats part the tissue, 2 G / b; the element that suits both, where tau_h = 2 G / b."""
-    G, b, h = 2.0, 5e-4, 5e-4
+    G, b, h = 3.0, 5e-4, 5e-4  # not 2: its double is its square
     said = resolution(1e4, G, 1564.0, 2e4, b, h, 0.02, 0.005).sentences
     (both,) = [s for s in said if "no strength suits both" in s]
     assert f"at least {2 * G / b:.4g} Pa" in both
