@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import tissuejax as tj
-from tissuejax.diagnosis.judgement.explore import Exploration
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 C1, C2, LOST, SCALE, NOISE = 450.0, 210.0, 0.75, 25.0, 15.0  # Pa; share of stiffness; J/m^3; Pa
@@ -40,8 +39,3 @@ def test_damage_on_the_virgin_path_is_softening_and_no_relaxation():
     names, values = diagnosed()
     assert names == ["softening"]
     assert values["d"] == pytest.approx(LOST, rel=0.1)
-
-
-def test_forms_near_the_top_alone_would_have_called_it_relaxation(monkeypatch):
-    monkeypatch.setattr(Exploration, "strange", property(lambda e: False))
-    assert diagnosed()[0] == ["viscoelasticity"]
