@@ -102,11 +102,11 @@ def to_si(value: Float[np.ndarray, "..."] | float, unit: str, si: str) -> Float[
     return value * factor(unit, si)
 
 
-def quantity(text: str | float, si: str, what: str = "value") -> float:
+def quantity(text: object, si: str, what: str = "value") -> float:
     """A number with its unit, such as "30 mm" or "30mm", in `si`; a bare number is taken only where `si` is "1".
 
     Args:
-        text: the number and its unit.
+        text: the number and its unit, a string, or a bare number.
         si: the unit wanted.
         what: what messages call it, e.g. the option that it was given to.
 

@@ -18,18 +18,16 @@ import jax
 
 from tissuejax.energies import catalogue as names
 from tissuejax.energies.energy import Energy
-from tissuejax.errors import InputError
+from tissuejax.experiments.catalogue import experiment
 from tissuejax.experiments.predictor import predictor
-from tissuejax.fitting.first import first as first_model
-from tissuejax.fitting.least_squares import fit as fit_problem
+from tissuejax.families import lookup, members
+from tissuejax.fitting import kinds
+from tissuejax.fitting.kinds.fitted import Fitted
 from tissuejax.fitting.options import Objective, Search, Unknowns
-from tissuejax.fitting.probed import fit_probed
 from tissuejax.fitting.result import Fit
 from tissuejax.fitting.setup import problem, split
-from tissuejax.fitting.stress_curve import METHOD as STRESS_CURVE
-from tissuejax.fitting.stress_curve import fit_stress_curve
 from tissuejax.model import Model
-from tissuejax.progress import Progress, Silent
+from tissuejax.progress import Progress
 from tissuejax.recordings.files import read
 from tissuejax.recordings.plausible import refuse_unusable, slips
 from tissuejax.recordings.recording import Sample
@@ -114,38 +112,16 @@ def fit(
         energy = material(energy, ogden_form=ogden_form, volumetric=volumetric, effects=effects)
     fitted, held = split(sample, tuple(only), tuple(holdout))
     refuse_unusable(sample, fitted)
-    probing = all(sample.recordings[name].experiment == "probing" for name in fitted)
-    if probing and energy.volumetric is None:
-        energy = Model(energy.energy, names.volumetric("quadratic"), energy.effects)
+    kind = lookup(
+        "kind of experiment", experiment(sample.recordings[fitted[0]].experiment).kind, members(kinds, Fitted)
+    )
     search, start = search or Search(), (unknowns or Unknowns()).start
-    posed = problem(predictor(energy, sample, fitted), unknowns, objective)
+    posed = problem(predictor(kind.completed(energy), sample, fitted), unknowns, objective)
     begun = None
     if first is not None:
-        if not probing:
-            raise InputError(f"first model {first}: surrogates are of probings, {', '.join(fitted)} are not")
-        from tissuejax.surrogate import store
-
-        begun = first_model(posed, store.read(first), start or {})
+        begun = kind.begin(posed, first, start or {})
         posed = replace(posed, start=dict(posed.start) | begun.start)
-    with (progress or Silent()).stage(f"fitting {energy.energy.name} to {sample.name}", None) as stage:
-        if search.method == STRESS_CURVE:
-            found = fit_stress_curve(posed, holdout=held)
-        elif probing:  # each run is a simulation: one start, few runs, errors that include the numerical one
-            found = fit_probed(
-                posed,
-                holdout=held,
-                max_steps=min(search.max_steps, 12),
-                progress=progress,
-                checkpoint=search.checkpoint,
-            ).fit
-        else:
-            found = fit_problem(
-                posed,
-                start=dict(posed.start) if start else None,
-                search=search,
-                holdout=held,
-                on_accept=lambda n, chi2, values: stage.advance(note=f"chi-square {chi2:.4g}"),
-            )
+    found = kind.fit(posed, held, search, bool(start), progress)
     found.warnings.extend(f"Look at the data: {sentence}." for sentence in slips(sample, (*fitted, *held)))
     return found if begun is None else replace(found, first=begun)
 

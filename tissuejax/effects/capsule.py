@@ -37,4 +37,4 @@ class Capsule(Effect):
 
     def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
         held = ballast(scene.body, jax.lax.stop_gradient(jnp.asarray(p["stiffness"])), scene.clock.step)
-        return scene.put({"tissue.capsule": p["stiffness"], "probe.mass": scene.probe.mass + held})
+        return scene.put({"tissue.capsule": p["stiffness"], "probe.mass": scene.pressed.mass + held})

@@ -51,5 +51,5 @@ class ContactOffset(Effect):
 
     def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
         down = jnp.array([0.0, 0.0, -1.0]) * p["depth"]
-        offset = down if scene.probe.offset is None else scene.probe.offset + down
-        return scene.put({"probe.offset": offset, "probe.time": scene.probe.time + p["delay"]})
+        offset = down if scene.pressed.offset is None else scene.pressed.offset + down
+        return scene.put({"probe.offset": offset, "probe.time": scene.pressed.time + p["delay"]})

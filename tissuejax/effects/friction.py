@@ -50,6 +50,6 @@ class Friction(Effect):
         )
 
     def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
-        already = scene.probe.friction
+        already = scene.pressed.friction
         rubbing = p["coefficient"] if already is None else already + p["coefficient"]
-        return scene.put({"probe.friction": rubbing, "probe.give": scene.probe.give + p["give"]})
+        return scene.put({"probe.friction": rubbing, "probe.give": scene.pressed.give + p["give"]})

@@ -65,6 +65,6 @@ def _mass(scene: Scene, test: ProbingTest, factor: Array) -> dict[str, Array]:
     """Extra mass of the nodes of stiffened elements, so that their wave speed stays."""
     extra = test.mass * jnp.maximum(factor - 1.0, 0.0)
     cells = scene.body.cells
-    extra = jnp.repeat(extra, cells.shape[1]).astype(scene.probe.mass.dtype)
-    mass = scene.probe.mass.at[cells.ravel()].add(extra)
+    extra = jnp.repeat(extra, cells.shape[1]).astype(scene.pressed.mass.dtype)
+    mass = scene.pressed.mass.at[cells.ravel()].add(extra)
     return {"probe.mass": mass}

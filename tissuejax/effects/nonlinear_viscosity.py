@@ -80,4 +80,5 @@ class NonlinearViscosity(Effect):
             max_steps=4096,
             throw=False,
         )
+        assert solution.ys is not None  # `saveat` asks for them
         return state.replaced(s - p["g"] * (solution.ys * p["stress"]))

@@ -66,10 +66,10 @@ class Registration(Effect):
     def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
         zero = jnp.zeros((), test.centres.dtype)
         aside = jnp.stack([zero + p["dx"], zero + p["dy"], zero])
-        offset = aside if scene.probe.offset is None else scene.probe.offset + aside
+        offset = aside if scene.pressed.offset is None else scene.pressed.offset + aside
         # the top stays where it was measured, everything below it moves down with the support
         points = scene.body.points.at[:, 2].add((-test.below_top * p["thickness"]).astype(scene.body.points.dtype))
-        radius = scene.probe.shape.radius + p["radius"]
+        radius = getattr(scene.pressed.shape, "radius", 0.0) + p["radius"]  # `put` refuses a shape without one
         return scene.put({"probe.offset": offset, "probe.shape.radius": radius, "body.points": points})
 
     def channels(

@@ -56,7 +56,7 @@ class SupportMotion(Effect):
         return (*lift, *lean, Parameter("frequency", "1/s", 0.25, lower=1e-4, upper=1e4, meaning="of the motion"))
 
     def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
-        time = scene.probe.time
+        time = scene.pressed.time
         angle = 2 * jnp.pi * p["frequency"] * (time if self.separate else test.start + time)
         lift = p["sin"] * jnp.sin(angle) + p["cos"] * jnp.cos(angle)
         lift = lift + p["sin2"] * jnp.sin(2 * angle) + p["cos2"] * jnp.cos(2 * angle)

@@ -140,7 +140,7 @@ class Viscoelasticity(Effect):
 
     def long_term(self, p: Mapping[str, Array]) -> Array:
         """Long-term over instantaneous stiffness, 1 - sum g_i."""
-        return 1 - sum(p[f"g{i}"] for i in self._numbers)
+        return 1 - sum((p[f"g{i}"] for i in self._numbers), jnp.zeros(()))
 
     def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:
         inverse, share, rest = state.inverse, p.get("moduli", float(self.moduli)), 1 - p.get("nominal", 0.0)
@@ -170,4 +170,5 @@ class Viscoelasticity(Effect):
         return cut.with_(relaxing=self._series(p))
 
     def _series(self, p: Mapping[str, Array]) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
-        return tuple(jnp.stack([jnp.asarray(p[f"{name}{i}"]) for i in self._numbers]) for name in ("g", "tau"))
+        g, tau = (jnp.stack([jnp.asarray(p[f"{name}{i}"]) for i in self._numbers]) for name in ("g", "tau"))
+        return g, tau

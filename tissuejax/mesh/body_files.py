@@ -5,6 +5,7 @@ The `[body]` table of a probing side file, `probing_files`. Lengths are in `unit
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -25,7 +26,7 @@ BODY_KEYS = ("surface", "cloud", "mesh", "slab", "unit", "edge", "thickness", "s
 KINDS = BODY_KEYS[:4]
 
 
-def body(table: Mapping[str, object], side: Path) -> tuple[Geometry, list[str], float]:
+def body(table: Mapping[str, Any], side: Path) -> tuple[Geometry, list[str], float]:
     """The body that a `[body]` table describes, standing on z = 0, sentences on how it was made, and how far the file's
     frame was lifted for that, m.
 
@@ -72,7 +73,7 @@ def body(table: Mapping[str, object], side: Path) -> tuple[Geometry, list[str], 
     return _from_cloud(path, scale, table, edge)
 
 
-def _slab(table: Mapping[str, object]) -> tuple[Geometry, list[str]]:
+def _slab(table: Mapping[str, Any]) -> tuple[Geometry, list[str]]:
     height = quantity(table["slab"], "m", "body.slab")
     width = quantity(table["width"], "m", "body.width") if "width" in table else 6 * height
     edge = quantity(table["edge"], "m", "body.edge") if "edge" in table else height / 6
@@ -97,7 +98,7 @@ def _surface(path: Path) -> trimesh.Trimesh:
 
 
 def _from_cloud(
-    path: Path, scale: float, table: Mapping[str, object], edge: float | None
+    path: Path, scale: float, table: Mapping[str, Any], edge: float | None
 ) -> tuple[Geometry, list[str], float]:
     cloud, lift = scale * _points(path), 0.0
     if "thickness" in table:
@@ -119,7 +120,7 @@ def _from_cloud(
 def _points(path: Path) -> Float[np.ndarray, "S 3"]:
     if path.suffix.lower() in (".ply", ".stl", ".obj", ".off"):
         try:
-            return np.array(trimesh.load(path).vertices, float)
+            return np.array(trimesh.load(path).vertices, float)  # pyright: ignore[reportAttributeAccessIssue]: clouds and meshes
         except Exception as error:  # as above
             raise InputError(f"{path}: found points that can't be read ({error})") from error
     found = from_text(path)

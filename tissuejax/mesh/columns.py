@@ -206,7 +206,8 @@ def _grid(quads: Int[np.ndarray, "Q 4"]) -> Int[np.ndarray, "a b"]:
                     else (nodes[(i - 1) % 4], nodes[(i - 2) % 4])
                 )
                 for node, near in ((beyond_b, b), (beyond_a, a)):
-                    spot = tuple(int(v) for v in np.add(place[near], away))
+                    across, along = np.add(place[near], away)
+                    spot = int(across), int(along)
                     if place.setdefault(node, spot) != spot:
                         raise InputError(
                             f"the columns don't form a rectangular grid (around node {node}); use the surface"

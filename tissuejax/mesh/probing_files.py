@@ -26,6 +26,7 @@ keeps each fifth point of a full field. Image correlation: a list of files, one 
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -68,7 +69,7 @@ def probing_sample(path: Path) -> Sample:
         raise error if str(error).startswith(str(path)) else InputError(f"{path}: {error}") from error
 
 
-def _sample(side: Mapping[str, object], path: Path) -> Sample:
+def _sample(side: Mapping[str, Any], path: Path) -> Sample:
     for key in side:
         if key not in WHOLE:
             raise unknown("key", key, WHOLE)
@@ -108,10 +109,11 @@ def _gravity(value: object) -> tuple[float, float, float] | None:
         return (0.0, 0.0, -GRAVITY)
     if not isinstance(value, list) or len(value) != 3 or not all(isinstance(v, int | float) for v in value):
         raise InputError(f"gravity: found {value!r}, expected three numbers in m/s^2, such as [0, 0, -9.81], or true")
-    return tuple(float(v) for v in value)
+    x, y, z = map(float, value)
+    return x, y, z
 
 
-def _rigid(table: Mapping[str, object]) -> Rigid:
+def _rigid(table: Mapping[str, Any]) -> Rigid:
     for key in ("unit", "moving", "target"):
         if key not in table:
             raise InputError(
@@ -126,7 +128,7 @@ def _rigid(table: Mapping[str, object]) -> Rigid:
 
 
 def _recordings(
-    part: Mapping[str, object], path: Path, rigid: Rigid | None, lift: float, height: float
+    part: Mapping[str, Any], path: Path, rigid: Rigid | None, lift: float, height: float
 ) -> list[Recording]:
     for key in part:
         if key not in PART:
@@ -148,7 +150,7 @@ def _recordings(
         moved = markers.values if rigid is None else rigid(markers.values)
         channels["markers"] = Channel(markers.time, moved + up, "m", _noise(markers, "m", "markers"))
     position = probe.values if rigid is None else rigid(probe.values)
-    attributes: dict[str, object] = {"probe/radius": radius}
+    attributes: dict[str, Any] = {"probe/radius": radius}
     if "edge" in part:
         attributes["probe/edge"] = quantity(part["edge"], "m", "probing.edge")
     if "start" in part:

@@ -67,7 +67,7 @@ def cell_volumes(points: Float[np.ndarray, "N 3"], cells: Int[np.ndarray, "E k"]
     if cell_type == "tetra":
         return np.linalg.det(x[:, 1:] - x[:, :1]) / 6
     signs = np.array([[-1, 1, 1, -1, -1, 1, 1, -1], [-1, -1, 1, 1, -1, -1, 1, 1], [-1, -1, -1, -1, 1, 1, 1, 1]])
-    total = 0.0
+    total = np.zeros(len(x))
     for place in signs.T / np.sqrt(3):
         one = 1 + place[:, None] * signs
         slopes = signs * np.stack([one[1] * one[2], one[0] * one[2], one[0] * one[1]]) / 8
@@ -83,12 +83,13 @@ def quality(geometry: Geometry) -> Quality:
     if geometry.cell_type == "tetra":
         pairs += [(1, 2), (1, 3), (2, 3)]
     edges = np.stack([np.linalg.norm(points[cells[:, a]] - points[cells[:, b]], axis=1) for a, b in pairs], 1)
+    wide, deep, high = np.ptp(points, axis=0)
     aspect = edges.max(1) / np.maximum(edges.min(1), 1e-300)
     return Quality(
         len(points),
         len(cells),
         float(cell_volumes(points, cells, geometry.cell_type).sum()),
-        tuple(float(s) for s in np.ptp(points, axis=0)),
+        (float(wide), float(deep), float(high)),
         float(edges.min()),
         (float(jacobian.min()), int(jacobian.argmin())),
         (float(aspect.max()), int(aspect.argmax())),

@@ -4,6 +4,7 @@ import glob
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -76,7 +77,7 @@ def points_over_time(spec: object, side: Path) -> Series:
     return Series(time, values[:, ::step] * _sign(spec, "markers"), _text(spec, "noise"))
 
 
-def _checked(spec: object, what: str) -> Mapping[str, object]:
+def _checked(spec: object, what: str) -> Mapping[str, Any]:
     if isinstance(spec, str):
         spec = {"file": spec}
     if not isinstance(spec, dict) or "file" not in spec:
@@ -122,7 +123,7 @@ def _three(content: Exported, letters: Sequence[str], path: Path, what: str) -> 
     """The columns whose name is, or ends with, the three letters."""
     plain = _bare_names(content)
     for make in (lambda a: [a], lambda a: [n for n in plain if n.split()[-1] == a]):
-        found = [next((n for n in make(a) if n in plain), None) for a in letters]
+        found = [next((n for n in make(a) if n in plain), "") for a in letters]
         if all(found):
             return [plain[n] for n in found]
     if what == "force":
@@ -133,14 +134,14 @@ def _three(content: Exported, letters: Sequence[str], path: Path, what: str) -> 
     )
 
 
-def _triples(content: Exported, spec: Mapping[str, object], path: Path) -> tuple[list[str], int]:
+def _triples(content: Exported, spec: Mapping[str, Any], path: Path) -> tuple[list[str], int]:
     """All columns that come in x, y, z, in the order of the file, and how many points they make."""
     if "columns" in spec:
         names = _named(spec["columns"], content, path)
         return names, len(names) // 3
     plain = _bare_names(content)
     heads = list(dict.fromkeys(n[:-1].rstrip() for n in plain if n[-1:] in "xyz" and n[:-1].strip()))
-    made = [[plain.get(f"{h} {a}", plain.get(f"{h}{a}")) for a in "xyz"] for h in heads]
+    made = [[plain.get(f"{h} {a}", plain.get(f"{h}{a}", "")) for a in "xyz"] for h in heads]
     names = [n for triple in made if all(triple) for n in triple]
     if not names:
         there = ", ".join(list(content.columns.cells)[:12])
@@ -149,7 +150,7 @@ def _triples(content: Exported, spec: Mapping[str, object], path: Path) -> tuple
 
 
 def _si(
-    content: Exported, names: Sequence[str], spec: Mapping[str, object], si: str, what: str, path: Path
+    content: Exported, names: Sequence[str], spec: Mapping[str, Any], si: str, what: str, path: Path
 ) -> Float[np.ndarray, "n c"]:
     units = [str(spec.get("unit", "")) or content.units.get(n, "") for n in names]
     if not all(units):
@@ -157,7 +158,7 @@ def _si(
     return np.stack([content.columns.numbers(n) * factor(u, si) for n, u in zip(names, units)], axis=1)
 
 
-def _time(content: Exported, spec: Mapping[str, object], path: Path, n: int) -> Float[np.ndarray, " n"]:
+def _time(content: Exported, spec: Mapping[str, Any], path: Path, n: int) -> Float[np.ndarray, " n"]:
     if "rate" in spec:
         return np.arange(n) / _rate(spec)
     name = str(spec.get("time", "")) or next(
@@ -171,7 +172,7 @@ def _time(content: Exported, spec: Mapping[str, object], path: Path, n: int) -> 
     return time
 
 
-def _rate(spec: Mapping[str, object]) -> float:
+def _rate(spec: Mapping[str, Any]) -> float:
     rate = quantity(spec["rate"], "Hz", "rate")
     if not rate > 0:
         raise InputError(f"rate: found {spec['rate']!r}, expected frames a second, above zero")
@@ -179,7 +180,7 @@ def _rate(spec: Mapping[str, object]) -> float:
 
 
 def _frames(
-    tracked: Sequence[Tracked], spec: Mapping[str, object], paths: Sequence[Path]
+    tracked: Sequence[Tracked], spec: Mapping[str, Any], paths: Sequence[Path]
 ) -> tuple[Float[np.ndarray, "m k 3"], Float[np.ndarray, " m"]]:
     """One file with its times, or the reference and deformed states of one file a frame."""
     first = tracked[0]
@@ -199,7 +200,7 @@ def _frames(
     return np.stack(frames), np.arange(len(frames)) / _rate(spec)
 
 
-def _scale(unit: str, spec: Mapping[str, object], path: Path) -> float:
+def _scale(unit: str, spec: Mapping[str, Any], path: Path) -> float:
     if "scale" in spec:
         return quantity(spec["scale"], "m", "markers.scale")
     if unit in ("", "pixel"):
@@ -207,12 +208,12 @@ def _scale(unit: str, spec: Mapping[str, object], path: Path) -> float:
     return factor(unit, "m")
 
 
-def _sign(spec: Mapping[str, object], what: str) -> float:
+def _sign(spec: Mapping[str, Any], what: str) -> float:
     sign = spec.get("sign", 1)
     if sign not in (1, -1):
         raise InputError(f"{what}.sign: found {sign!r}, expected 1 or -1")
     return float(sign)
 
 
-def _text(spec: Mapping[str, object], key: str) -> str | None:
+def _text(spec: Mapping[str, Any], key: str) -> str | None:
     return str(spec[key]) if key in spec else None

@@ -45,7 +45,7 @@ def fill(surface: trimesh.Trimesh, edge: float, support: float | None = None) ->
     diagonal = float(np.linalg.norm(surface.extents))
     # the generator leaves its working surface in the current folder, which is the user's
     with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
-        points, cells = pytetwild.tetrahedralize(
+        points, cells = pytetwild.tetrahedralize(  # pyright: ignore[reportPrivateImportUsage]: its one public function
             np.asarray(surface.vertices),
             np.asarray(surface.faces, np.int32),
             edge_length_fac=edge / diagonal,

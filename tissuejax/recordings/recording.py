@@ -5,6 +5,7 @@ error measure serves both.
 """
 
 from collections.abc import Mapping
+from typing import Any
 
 import equinox as eqx
 import numpy as np
@@ -21,8 +22,8 @@ class Channel(eqx.Module):
         noise_std: standard deviation of the noise per value; None if not recorded.
     """
 
-    time: Float[Array, " n"]
-    values: Float[Array, "n ..."]
+    time: Float[Array | np.ndarray, " n"]
+    values: Float[Array | np.ndarray, "n ..."]
     unit: str = eqx.field(static=True)
     noise_std: float | None = eqx.field(static=True, default=None)
 
@@ -42,9 +43,9 @@ class Recording(eqx.Module):
 
     name: str = eqx.field(static=True)
     experiment: str = eqx.field(static=True)
-    inputs: Mapping[str, Array]
+    inputs: Mapping[str, Array | np.ndarray]
     channels: Mapping[str, Channel]
-    attributes: Mapping[str, object] = eqx.field(default_factory=dict)
+    attributes: Mapping[str, Any] = eqx.field(default_factory=dict)
 
 
 class Geometry(eqx.Module):

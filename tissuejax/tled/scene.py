@@ -22,7 +22,7 @@ from jaxtyping import Array, Float, Int
 from tissuejax.elements.element import Element
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.volumetric import Volumetric
-from tissuejax.errors import unknown
+from tissuejax.errors import InputError, unknown
 from tissuejax.tled.faces import Faces
 from tissuejax.tled.history import Damage, Prony
 from tissuejax.tled.shapes import Shape
@@ -218,6 +218,17 @@ class Scene(eqx.Module):
         for path, value in changes.items():
             scene = _put(scene, path.split("."), value, path)
         return scene
+
+    @property
+    def pressed(self) -> Probe:
+        """The probe of a scene that has one: a probing's effects act on it.
+
+        Raises:
+            InputError: nothing touches this tissue.
+        """
+        if self.probe is None:
+            raise InputError("this scene has no probe: effects of a probing need one")
+        return self.probe
 
     @property
     def stiffness(self) -> Float[Array, " E"]:

@@ -1,0 +1,1 @@
+"""Kinds of recordings as a fit goes about them, one a file."""
