@@ -5,18 +5,24 @@ four regions of the brain. Every specimen is fitted by itself; the hierarchical 
 separate ones. Then specimens are held out, five parts in turn, with their group known or with their whole group held
 out, and it is counted how often the 95 % interval holds their estimate and the stress that was measured on them.
 
+Parts that are done are kept under out/population: a run that is stopped goes on there.
+
 tissuejax study fits/population        (COHORTS=Ecoflex,brain in the environment: only these; the others' results stay)
 """
 
 import json
 import os
 import re
+from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 import tissuejax as tj
+from tissuejax.cache import source
+from tissuejax.cache.key import key
 from tissuejax.campaign.population import Estimates, Runner, estimates, pooled, population
 from tissuejax.errors import TissueError
 from tissuejax.fitting.result import Fit
@@ -29,6 +35,7 @@ ONCE = tj.Search(multistart=1)
 
 DRAWS, WARMUP, CHAINS, PARTS, SEED = 400, 400, 2, 5, 5
 RELAXATION = ((0.05, 0.65), (0.5, 0.21), (6.0, 0.07))  # s, share: median of five tests, fits/beef/README.md
+KINDS = ("hierarchical", "classical", "pooled")
 SHARES = (0.25, 0.5, 0.75, 1.0)  # of a test's largest strain, where its stress is predicted
 
 
@@ -80,44 +87,68 @@ def stresses(found: Fit) -> tuple[np.ndarray, np.ndarray]:
     return J[at], np.asarray(measured.channels[name].values, float)[at]
 
 
-def covered(of: Estimates, fits: dict[str, Fit], by_group: bool, runner: Runner) -> dict[str, dict[str, float]]:
-    """Shares of held-out estimates and stresses inside 95 % intervals of three kinds."""
+def covered(of: Estimates, fits: dict[str, Fit], by_group: bool, runner: Runner, kept: Path) -> dict[str, dict]:
+    """Shares of held-out estimates and stresses inside 95 % intervals of three kinds, and the median width."""
     rng, n = np.random.default_rng(SEED), len(of.samples)
     if by_group:
         parts = np.array_split(rng.permutation(len(of.labels)), min(PARTS, len(of.labels)))
         folds = [np.isin(of.group, part) for part in parts]
     else:
         folds = [np.isin(np.arange(n), part) for part in np.array_split(rng.permutation(n), min(PARTS, n))]
-    hits = {kind: {"estimate": [], "stress": []} for kind in ("hierarchical", "classical", "pooled")}
-    widths = {kind: [] for kind in hits}
-    x, S = of.working
-    for k, out in enumerate(folds):
-        found = population(of, seen=~out, seed=k, runner=runner)
-        m, sd, count = x[~out].mean(0), x[~out].std(0, ddof=1), int((~out).sum())
-        kept = Estimates(tuple(np.array(of.samples)[~out]), of.paths, of.values[~out], of.covariance[~out], of.positive)
-        value, error = pooled(kept)
-        for i in np.flatnonzero(out):
-            known = bool(of.groups) and not by_group
-            draws = found.new(of.groups[i] if known else None, seed=i)
-            # Student's prediction interval of specimens all of one kind; draws, so that both give stresses
-            t = rng.standard_t(count - 1, size=(len(draws), len(m)))
-            kinds = {
-                "hierarchical": draws,
-                "classical": of.natural(m + sd * np.sqrt(1 + 1 / count) * t),
-                "pooled": value + error * rng.normal(size=draws.shape),
-            }
-            J, measured = stresses(fits[of.samples[i]])
-            for kind, theta in kinds.items():
-                noise = rng.multivariate_normal(np.zeros(len(m)), of.covariance[i], size=len(theta))
-                hits[kind]["estimate"].append(_inside(theta + noise, of.values[i]))
-                predicted = theta @ J.T
-                hits[kind]["stress"].append(_inside(predicted, measured))
-                low, high = np.quantile(predicted[:, -1], [0.025, 0.975])
-                widths[kind].append((high - low) / abs(measured[-1]))
-    return {
-        kind: {what: float(np.mean(of_)) for what, of_ in by.items()} | {"width": float(np.median(widths[kind]))}
-        for kind, by in hits.items()
-    }
+    found = {kind: {"estimate": [], "stress": [], "width": []} for kind in KINDS}
+    with for_terminal().stage(f"parts held out, {'groups' if by_group else 'specimens'}", len(folds)) as stage:
+        for k, out in enumerate(folds):
+            part = once(kept, ("held out", k, out, by_group, of), partial(held_out, of, fits, by_group, runner, k, out))
+            for kind, by in part.items():
+                for what, hits in by.items():
+                    found[kind][what] += hits
+            stage.advance(note=f"{int(out.sum())} specimens")
+    middle = {"width": np.median}
+    return {kind: {what: float(middle.get(what, np.mean)(x)) for what, x in by.items()} for kind, by in found.items()}
+
+
+def held_out(of: Estimates, fits: dict[str, Fit], by_group: bool, runner: Runner, k: int, out: np.ndarray) -> dict:
+    """One part: which estimates and stresses of the specimens `out` lie inside, and how wide the stress's interval is
+    at the largest strain over the stress measured there."""
+    x, _ = of.working
+    rng = np.random.default_rng([SEED, k])
+    found = population(of, seen=~out, seed=k, runner=runner)
+    m, sd, count = x[~out].mean(0), x[~out].std(0, ddof=1), int((~out).sum())
+    told = Estimates(tuple(np.array(of.samples)[~out]), of.paths, of.values[~out], of.covariance[~out], of.positive)
+    value, error = pooled(told)
+    hits = {kind: {"estimate": [], "stress": [], "width": []} for kind in KINDS}
+    for i in np.flatnonzero(out):
+        known = bool(of.groups) and not by_group
+        draws = found.new(of.groups[i] if known else None, seed=i)
+        # Student's prediction interval of specimens all of one kind; draws, so that both give stresses
+        t = rng.standard_t(count - 1, size=(len(draws), len(m)))
+        of_kind = {
+            "hierarchical": draws,
+            "classical": of.natural(m + sd * np.sqrt(1 + 1 / count) * t),
+            "pooled": value + error * rng.normal(size=draws.shape),
+        }
+        J, measured = stresses(fits[of.samples[i]])
+        for kind, theta in of_kind.items():
+            noise = rng.multivariate_normal(np.zeros(len(m)), of.covariance[i], size=len(theta))
+            predicted = theta @ J.T
+            low, high = np.quantile(predicted[:, -1], [0.025, 0.975])
+            hits[kind]["estimate"].append(_inside(theta + noise, of.values[i]).tolist())
+            hits[kind]["stress"].append(_inside(predicted, measured).tolist())
+            hits[kind]["width"].append(float((high - low) / abs(measured[-1])))
+    return hits
+
+
+def once(kept: Path, told: tuple, work: Callable[[], dict]) -> dict:
+    """What `work` gives, or what it gave before for the same data, settings and code: so a run that was stopped goes
+    on at the part where it was."""
+    name = key(DRAWS, WARMUP, CHAINS, SEED, Path(__file__).read_text(), *told)
+    at = kept / f"{name}.json"
+    if name is None or not at.is_file():
+        found = work()
+        if name is not None:
+            write_json(at, found)
+        return found
+    return json.loads(at.read_text())
 
 
 def _inside(draws: np.ndarray, value: np.ndarray) -> np.ndarray:
@@ -128,10 +159,11 @@ def _inside(draws: np.ndarray, value: np.ndarray) -> np.ndarray:
 def main(folder: Path) -> str:
     """Fit, shrink, hold out; result.json, and a page for each cohort under figures/."""
     kept, fits_folder = folder / "result.json", folder.resolve().parent
+    work = folder.resolve().parents[1] / "out" / "population"
     wanted = set(filter(None, os.environ.get("COHORTS", "").split(",")))
     record = json.loads(kept.read_text()) if wanted and kept.is_file() else {}
-    if not (fits_folder / "beef").is_dir():
-        fits_folder = Path(__file__).resolve().parents[1]
+    if not (fits_folder / "beef").is_dir():  # run in a copy: the cohorts' side files lie in the checkout
+        fits_folder = source.ROOT.parent / "fits"
     for name, told in cohorts(fits_folder).items():
         if wanted and name not in wanted:
             continue
@@ -150,10 +182,10 @@ def main(folder: Path) -> str:
             "error_over_spread": np.median(
                 np.sqrt(np.einsum("nii->ni", S)) / np.sqrt(np.einsum("dii->di", found.between)).mean(0), 0
             ).tolist(),
-            "held_out": {"specimens": covered(of, fits, False, runner)},
+            "held_out": {"specimens": covered(of, fits, False, runner, work)},
         }  # fmt: skip
         if len(of.labels) > 3:
-            record[name]["held_out"]["groups"] = covered(of, fits, True, runner)
+            record[name]["held_out"]["groups"] = covered(of, fits, True, runner, work)
         write_json(kept, record)
     told = {n: r["held_out"]["specimens"]["hierarchical"]["estimate"] for n, r in record.items() if "held_out" in r}
     return "held-out specimens inside 95 %: " + ", ".join(f"{n} {share:.0%}" for n, share in told.items())

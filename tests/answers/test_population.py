@@ -2,10 +2,12 @@
 
 import json
 
+import jax
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
-from tissuejax.campaign.population import Estimates, Population, estimates, pooled, population
+from tissuejax.campaign.population import Estimates, Population, Runner, estimates, log_likelihood, pooled, population
 from tissuejax.cli import main
 from tissuejax.errors import InputError
 
@@ -56,6 +58,50 @@ def test_with_the_spreads_known_a_specimen_is_the_weighted_mean(rng):
     assert np.std(new[:, 1]) == pytest.approx(2.0, rel=0.15)
     with pytest.raises(InputError, match="g0"):
         known.new("g9")
+
+
+ROOTS = np.array([[0.5, 0.0], [0.2, 0.7]]), np.array([[0.9, 0.0], [-0.3, 0.4]])
+
+
+def dense(of: Estimates, m, between, among, seen):
+    """Mean and covariance of all effects and all seen estimates stacked, every entry written out."""
+    x, S = of.working
+    g, at = len(of.labels), np.flatnonzero(seen)
+    A, B = among @ among.T, between @ between.T
+    prior = np.kron(np.eye(g), A)
+    pick = np.kron(np.eye(g)[of.group[at]], np.eye(2))
+    own = np.zeros((2 * len(at), 2 * len(at)))
+    for k, i in enumerate(at):
+        own[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = B + S[i]
+    data = x[at].ravel() - np.tile(m, len(at))
+    return prior, pick, own, data
+
+
+def test_what_is_integrated_out_is_the_dense_normal_distribution(rng):
+    _, of = made(rng, n=9, groups=3)
+    x, S = of.working
+    m, seen = np.array([7.5, 4.0]), np.arange(9) % 4 != 1
+    prior, pick, own, data = dense(of, m, *ROOTS, seen)
+    whole = pick @ prior @ pick.T + own
+    got = log_likelihood(m, *ROOTS, x, S, of.group, seen.astype(float), 3)
+    assert float(got) == pytest.approx(multivariate_normal.logpdf(data, np.zeros(len(data)), whole), rel=1e-9)
+    alone = log_likelihood(m, ROOTS[0], None, x, S, of.group, seen.astype(float), 1)
+    assert float(alone) == pytest.approx(multivariate_normal.logpdf(data, np.zeros(len(data)), own), rel=1e-9)
+
+
+def test_effects_are_drawn_from_their_conditional_distribution(rng):
+    _, of = made(rng, n=9, groups=3)
+    x, S = of.working
+    m, seen = np.array([7.5, 4.0]), np.arange(9) % 4 != 1
+    prior, pick, own, data = dense(of, m, *ROOTS, seen)
+    gain = prior @ pick.T @ np.linalg.inv(pick @ prior @ pick.T + own)
+    n = 20_000
+    many = (np.tile(v, (n, *[1] * v.ndim)) for v in (m, *ROOTS))
+    drawn = np.asarray(Runner(3).effects(jax.random.split(jax.random.key(0), n), *many, x, S, of.group, seen * 1.0))
+    flat, spread = drawn.reshape(n, -1), prior - gain @ pick @ prior
+    error = np.sqrt(np.diag(spread) / n)
+    assert (np.abs(flat.mean(0) - gain @ data) < 4.5 * error).all()
+    np.testing.assert_allclose(np.cov(flat.T), spread, atol=0.05 * np.diag(spread).max())
 
 
 @pytest.mark.slow

@@ -5,18 +5,22 @@ positive)
 
     x_i ~ N(m + a_g(i), B + S_i),    a_g ~ N(0, A),
 
-so a specimen's true values are integrated out and NUTS (numpyro, the extra `bayes`) only moves the mean m, the group
-effects a and the two covariances: a hierarchical fit in two stages, exact where each fit is quadratic. Beside it stand
-separate fits (x_i alone) and the pooled one (all specimens alike). Gelman and Hill 2007, ch. 12.
+so a specimen's true values and the effects of groups are integrated out in closed form. NUTS (numpyro, the extra
+`bayes`) only moves the mean m and the two covariances; each draw is then given group effects from their normal
+conditional distribution. A hierarchical fit in two stages, exact where each fit is quadratic. Beside it stand separate
+fits (x_i alone) and the pooled one (all specimens alike). Gelman and Hill 2007, ch. 12.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jax.scipy.linalg import solve_triangular
+from jax.scipy.stats import multivariate_normal
+from jaxtyping import Array, Bool, Float, Int
 
 from tissuejax.errors import InputError
 
@@ -215,6 +219,7 @@ class Runner:
             raise InputError(
                 "a population needs the extra `bayes`: pip install 'tissuejax[bayes]' (numpyro)"
             ) from error
+        self.effects = jax.jit(jax.vmap(partial(_effects_drawn, groups), (0, 0, 0, 0, None, None, None, None)))
         kernel = NUTS(_model(max(groups, 1), groups > 1), dense_mass=True, target_accept_prob=0.9)
         self.run = MCMC(
             kernel, num_warmup=warmup, num_samples=draws, num_chains=chains, chain_method="sequential",
@@ -233,7 +238,11 @@ class Runner:
         found = {"m": draws["m"], "B": _covariance(draws["b"], draws["Lb"])}
         n, p = draws["m"].shape
         found["A"] = _covariance(draws["s"], draws["La"]) if "s" in draws else np.zeros((n, p, p))
-        found["a"] = draws["a"] if "a" in draws else np.zeros((n, 1, p))
+        found["a"] = np.zeros((n, 1, p))
+        if "s" in draws:
+            roots = [draws[sd][:, :, None] * draws[L] for sd, L in (("b", "Lb"), ("s", "La"))]
+            keys = jax.random.split(jax.random.key(seed + 1), n)
+            found["a"] = np.asarray(self.effects(keys, *map(jnp.asarray, (draws["m"], *roots)), *arguments))
         diverged = int(np.sum(np.asarray(self.run.get_extra_fields()["diverging"])))
         return found | {"divergences": diverged, "rhat": rhat}
 
@@ -242,28 +251,57 @@ def _model(groups: int, several: bool):
     import numpyro
     from numpyro import distributions as dist
 
+    def root(sd: str, correlation: str, p: int):
+        size = numpyro.sample(sd, dist.HalfNormal(WIDE).expand([p]).to_event(1))
+        if p == 1:
+            return size[:, None] * numpyro.deterministic(correlation, jnp.ones((1, 1)))
+        return size[:, None] * numpyro.sample(correlation, dist.LKJCholesky(p, 2.0))
+
     def model(x, S, group, seen):
         p = x.shape[1]
         m = numpyro.sample("m", dist.Normal(0.0, 5.0).expand([p]).to_event(1))
-        b = numpyro.sample("b", dist.HalfNormal(WIDE).expand([p]).to_event(1))
-        L = numpyro.sample("Lb", dist.LKJCholesky(p, 2.0)) if p > 1 else numpyro.deterministic("Lb", jnp.ones((1, 1)))
-        centre = jnp.broadcast_to(m, x.shape)
-        if several:
-            s = numpyro.sample("s", dist.HalfNormal(WIDE).expand([p]).to_event(1))
-            La = (
-                numpyro.sample("La", dist.LKJCholesky(p, 2.0))
-                if p > 1
-                else numpyro.deterministic("La", jnp.ones((1, 1)))
-            )
-            z = numpyro.sample("z", dist.Normal().expand([groups, p]).to_event(2))
-            a = numpyro.deterministic("a", z @ (s[:, None] * La).T)
-            centre = centre + a[group]
-        root = b[:, None] * L
-        covariance = root @ root.T + S + 1e-12 * jnp.eye(p)
-        likely = dist.MultivariateNormal(centre, covariance).log_prob(x)
-        numpyro.factor("data", jnp.sum(seen * likely))
+        between = root("b", "Lb", p)
+        among = root("s", "La", p) if several else None
+        numpyro.factor("data", log_likelihood(m, between, among, x, S, group, seen, groups))
 
     return model
+
+
+def log_likelihood(m, between, among, x, S, group, seen, groups: int) -> Float[Array, ""]:
+    """Of the estimates, true values and group effects integrated out.
+
+    Args:
+        m: (p), the mean.
+        between, among: lower roots (p, p) of B and of A; no groups: None.
+        x, S, group: estimates (n, p), their covariances (n, p, p), their groups (n).
+        seen: (n) 1 for a specimen that takes part, 0 for one that does not.
+        groups: how many.
+    """
+    covariance = between @ between.T + S + 1e-12 * jnp.eye(x.shape[1])
+    alone = jnp.sum(seen * multivariate_normal.logpdf(x, m, covariance))
+    if among is None:
+        return alone
+    # x_i of a group share a = among z, z ~ N(0, 1): completing the square in z leaves K and h
+    K, h = _of_groups(m, between, among, x, S, group, seen, groups)
+    return alone + 0.5 * jnp.sum(h * jnp.linalg.solve(K, h[..., None])[..., 0]) - 0.5 * jnp.linalg.slogdet(K)[1].sum()
+
+
+def _of_groups(m, between, among, x, S, group, seen, groups: int):
+    """Precision K (g, p, p) of each group's standardised effect z given the data, and K times its mean, h (g, p)."""
+    p = x.shape[1]
+    weight = seen[:, None, None] * jnp.linalg.inv(between @ between.T + S + 1e-12 * jnp.eye(p))
+    pull = (weight @ (x - m)[..., None])[..., 0]
+    K = jnp.eye(p) + among.T @ jax.ops.segment_sum(weight, group, groups) @ among
+    return K, jax.ops.segment_sum(pull, group, groups) @ among
+
+
+def _effects_drawn(groups: int, key, m, between, among, x, S, group, seen) -> Float[Array, "g p"]:
+    """The effects of all groups for one draw of m, B and A: z ~ N(K^-1 h, K^-1), a = among z."""
+    K, h = _of_groups(m, between, among, x, S, group, seen, groups)
+    root = jnp.linalg.cholesky(K)
+    normal = jax.random.normal(key, h.shape)
+    own = solve_triangular(root, normal[..., None], trans=1, lower=True)
+    return (jnp.linalg.solve(K, h[..., None]) + own)[..., 0] @ among.T
 
 
 def _covariance(sd: np.ndarray, root: np.ndarray) -> np.ndarray:
