@@ -14,8 +14,10 @@ from tests.tled import cases
 from tissuejax.mesh.columns import box
 from tissuejax.mesh.facets import boundary
 from tissuejax.tled import build, contact, internal, native
+from tissuejax.tled.blade import Wedge
 from tissuejax.tled.history import Damage, Prony
 from tissuejax.tled.lanes import library, loop
+from tissuejax.tled.lanes.walk import Untold
 from tissuejax.tled.shapes import Punch, Sphere
 
 pytestmark = pytest.mark.skipif(library.compiler() is None, reason="no C compiler here")
@@ -78,7 +80,10 @@ def test_what_c_computes_is_what_xla_computes(set_up, derived):
         assert np.allclose(a, b, rtol=0, atol=1e-12 * np.abs(b).max())
 
 
-@pytest.mark.parametrize("form", [Sphere(4e-3), Punch(3e-3, 1e-3)], ids=["ball", "flat punch"])
+SIDES = Wedge(8e-3, 0.3, 2e-3, side=np.tile([1.0, 1.0, -1.0, -1.0], 4))  # of the facets on the tissue's either side
+
+
+@pytest.mark.parametrize("form", [Sphere(4e-3), Punch(3e-3, 1e-3), SIDES], ids=["ball", "flat punch", "blade"])
 @pytest.mark.parametrize("rough", [False, True], ids=["bare", "friction and adhesion"])
 def test_contact_in_c_is_contact_by_xla(monkeypatch, form, rough):
     """Forces, torque, what rubbing lost and the memory after two places of the probe, their tangents and gradients."""
@@ -86,7 +91,7 @@ def test_contact_in_c_is_contact_by_xla(monkeypatch, form, rough):
     points = np.asarray(made.body.points)
     facets = boundary(np.asarray(made.body.cells), "hexahedron").nodes
     facets = facets[(points[facets][..., 2] > 0.0099).all(1)]
-    path = np.array([[0, 0, 0.02], [0, 0, 0.02]])
+    path = np.array([[-0.1, 0, 0.02], [-0.1, 0, 0.02]])  # far from the tissue; places are given below
     probe = build.probe(made, form, [0.0, 1.0], path, facets, penalty=2e6, softness=1e-4)
     if rough:
         more = dict(friction=jnp.array(0.3), adhesion=jnp.array(500.0), give=jnp.array(1e-8), reach=jnp.array(2e-4))
@@ -123,7 +128,7 @@ def test_points_far_from_the_probe_cost_no_more_than_others():
     points = np.asarray(made.body.points)
     facets = boundary(np.asarray(made.body.cells), "hexahedron").nodes
     facets = facets[(points[facets][..., 2] > 0.0099).all(1)]
-    path = np.array([[0, 0, 0.02], [0, 0, 0.02]])
+    path = np.array([[-0.1, 0, 0.02], [-0.1, 0, 0.02]])  # far from the tissue; places are given below
     probe = build.probe(made, Sphere(4e-3), [0.0, 1.0], path, facets, penalty=2e6, softness=1e-3)
     single = lambda x: jnp.asarray(x) if np.asarray(x).dtype.kind == "i" else jnp.asarray(x, jnp.float32)  # noqa: E731
     probe = jax.tree.map(single, probe)
@@ -172,6 +177,17 @@ def test_operations_without_a_form_in_c_are_left_to_jax():
         np.add.at(by_hand, cells[:, e], stiffness[e] * np.cumsum(np.tanh(np.asarray(x[0])[cells[:, e]])))
     assert np.allclose(f[0], by_hand, rtol=1e-12)
     assert np.allclose(s, stiffness**2 * np.asarray(x[0])[np.asarray(cells)].sum(0), rtol=1e-12)
+
+
+def test_a_number_for_each_lane_given_as_one_for_all_is_refused():
+    """The sides of a blade's facets once were, and each facet was pushed to the first one's side."""
+
+    def lane(x, side):
+        return [side * jnp.sum(x, (0, 1))]
+
+    slots = [loop.Slot("nodal", (3,)), loop.Slot("uniform", (16,))]
+    with pytest.raises(Untold, match="one number a lane"):
+        loop.trace(lane, 4, slots, ["lane"], jnp.float64)
 
 
 @pytest.mark.parametrize(("chosen", "wanted"), [("", False), ("off", False), ("on", True)])

@@ -32,6 +32,7 @@ class Wedge(Shape):
     """
 
     name: ClassVar[str] = "wedge"
+    by_facet: ClassVar[tuple[str, ...]] = ("side",)
     thickness: Float[Array, ""] | float
     slope: Float[Array, ""] | float
     rounding: Float[Array, ""] | float

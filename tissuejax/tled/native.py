@@ -136,8 +136,11 @@ def contact(by_facet: Callable, probe: "Probe", patch: Any, grip: Any) -> Callab
     leaves = [jnp.asarray(x) for x in leaves]
     if any(x.dtype != dtype for x in leaves):
         return None
-    same = len(jax.tree.leaves(bare))  # for all facets
-    slots = [Slot("uniform", x.shape) if i < same else Slot("lane", x.shape[:-1]) for i, x in enumerate(leaves)]
+    own = [_by_facet(place, bare) for place, _ in jax.tree_util.tree_leaves_with_path(bare)]
+    own += [True] * (len(leaves) - len(own))  # area, places and memory are
+    slots = [
+        Slot("lane", x.shape[:-1]) if mine and x.ndim else Slot("uniform", x.shape) for x, mine in zip(leaves, own)
+    ]
     key = ("contact", structure, tuple(slots), dtype)
     kernel = _remembered(key, lambda: _contact(by_facet, structure, slots, len(patch.nodes), dtype))
     if kernel is None:
@@ -150,6 +153,11 @@ def contact(by_facet: Callable, probe: "Probe", patch: Any, grip: Any) -> Callab
         return out[0], out[1], out[2], out[3] if sums > 2 else None, after
 
     return touch
+
+
+def _by_facet(place: tuple, probe: "Probe") -> bool:
+    """Whether the leaf there of a probe may differ from facet to facet."""
+    return getattr(place[-1], "name", None) in probe.shape.by_facet
 
 
 def _contact(by_facet, structure, slots, corners: int, dtype) -> Kernel | None:

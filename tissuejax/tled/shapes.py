@@ -18,9 +18,14 @@ def _length(*parts):
 
 
 class Shape(eqx.Module):
-    """A rigid shape about its reference point."""
+    """A rigid shape about its reference point.
+
+    Class data:
+        by_facet: names of attributes that may hold one number for each facet that the shape may touch.
+    """
 
     name: ClassVar[str]
+    by_facet: ClassVar[tuple[str, ...]] = ()
 
     @abc.abstractmethod
     def distance(self, x: Vector) -> tuple[Float[Array, "..."], Vector]:

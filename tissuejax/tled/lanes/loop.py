@@ -117,10 +117,17 @@ def trace(
     function: Callable, corners: int, ins: Sequence[Slot], outs: Sequence[str], dtype, width: int = WIDTH
 ) -> Kernel:
     """The kernel of a function of one lane's arrays; `outs`: "nodal", "lane" or "uniform" (a sum over the lanes, given
-    without their axis) for each of the arrays it returns."""
+    without their axis) for each of the arrays it returns.
+
+    Raises:
+        Untold: a result that is not of one lane.
+    """
     shapes = {"nodal": lambda s: (*s.shape, corners, 1), "lane": lambda s: (*s.shape, 1), "uniform": lambda s: s.shape}
     closed = jax.make_jaxpr(function)(*(jax.ShapeDtypeStruct(shapes[s.kind](s), dtype) for s in ins))
     last = {"nodal": 2, "lane": 1, "uniform": 0}
+    for kind, a in zip(outs, closed.out_avals, strict=True):
+        if kind != "uniform" and a.shape[-1:] != (1,):  # it met an argument with a number for each lane, taken for all
+            raise Untold(f"a result of shape {a.shape}, where one number a lane is wanted")
     found = [Slot(k, a.shape[: a.ndim - last[k]]) for k, a in zip(outs, closed.out_avals, strict=True)]
     return Kernel(closed, corners, ins, found, width)
 
