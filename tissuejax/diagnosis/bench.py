@@ -13,6 +13,7 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Float
 
+from tissuejax.effects.form import Placed
 from tissuejax.estimation.series import Segment
 
 
@@ -53,6 +54,8 @@ class Candidate:
         widens: families of the discrepancy that may be far larger where this acts, with the width of their prior; such
             a candidate has no parameters of its own.
         rig: a fault of the rig, and not of the tissue.
+        spectral: path of a frequency that is read from the residual's periodogram, and how many of its lines are tried.
+        placed: of probings: settings of the shapes by where the probe went deepest (`effects.form.Form`).
     """
 
     name: str
@@ -65,6 +68,8 @@ class Candidate:
     beside: tuple[str, ...] = ()
     widens: Mapping[str, float] = field(default_factory=dict)
     rig: bool = False
+    spectral: tuple[str, int] | None = None
+    placed: Placed | None = None
 
     @property
     def key(self) -> str:

@@ -69,6 +69,8 @@ class Entry(Offer):
                     held=tuple(held),
                     nominated=form.nominated,
                     rig=self.effect.order == 0,
+                    spectral=form.spectral and (f"{prefix}.{form.spectral[0]}", form.spectral[1]),
+                    placed=form.placed,
                 )
             )
         times = [p for p in free if p.startswith(f"{prefix}.tau") and p[-1].isdigit()]

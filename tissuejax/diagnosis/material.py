@@ -248,14 +248,13 @@ class MaterialBench(Bench):
 
     def _price(self, model: Model) -> float:
         """What a prediction costs beside that of the base model, from measured times: searches multiply."""
-        names, full = {e.name for e in model.effects}, {e.name for e in model.effects if e in self._full}
-        memory, fibres = bool(names & self._remembering), "anisotropy" in names
+        full = [e for e in model.effects if e in self._full]
+        memory, fibres = any(e.history for e in model.effects), any(not e.isotropic for e in model.effects)
         inner = 1.0 + 1.5 * memory + 4 * fibres + 3 * bool(full)
-        if fibres and "energy-form" in full:  # powers of principal stretches, which fibres take off the axes
+        if fibres and any(e.isotropic for e in full):  # powers of principal stretches, which fibres take off the axes
             inner = 90.0
-        swelling = (8.0 if memory else 3.0) if "compressibility" in names else 1.0
-        rig = (8.0 if fibres or memory else 5.0) if "machine-compliance" in names else 1.0
-        return inner * swelling * rig
+        searches = [e.price for e in model.effects]
+        return inner * math.prod(max(p.alone, memory * p.memory, fibres * p.fibres) for p in searches)
 
     def _put(self, out: Float[np.ndarray, " N"], name: str, stress: Float[np.ndarray, "n ..."]) -> None:
         for s in self._of[name]:
@@ -328,14 +327,15 @@ class MaterialBench(Bench):
 
     def settings(self, candidate: Candidate, prediction: Float[np.ndarray, " N"]) -> Sequence[Mapping[str, float]]:
         """Frequencies are read from the periodogram of the residual; see `Bench.settings`."""
-        if candidate.name != "periodic":
+        if candidate.spectral is None:
             return candidate.grid
+        path, most = candidate.spectral
         series = [
             ((s.time - s.time[0]), (self.y - prediction)[s.rows] / self.sigma[s.rows])
             for s in self.segments
             if s.recording in self.fitted
         ]
-        return [{"effects.periodic.frequency": f} for f in lines(series, 3)]
+        return [{path: f} for f in lines(series, most)]
 
 
 def strain_states(bench: MaterialBench) -> list[State]:

@@ -26,7 +26,7 @@ from tissuejax.diagnosis import probing_free
 from tissuejax.diagnosis.bench import Bench, Candidate, Free
 from tissuejax.diagnosis.catalogue import Entry
 from tissuejax.diagnosis.periodogram import lines
-from tissuejax.diagnosis.probing_catalogue import places, probing_entries
+from tissuejax.diagnosis.probing_catalogue import probing_entries
 from tissuejax.diagnosis.probing_runs import COARSE, FINE, RETIMED, ROUGH, Runs
 from tissuejax.diagnosis.probing_series import calmed, kept_samples, series
 from tissuejax.diagnosis.probing_slopes import Slopes
@@ -217,11 +217,14 @@ class ProbingBench(Bench):
 
     def settings(self, candidate: Candidate, prediction: Float[np.ndarray, " N"]) -> Sequence[Mapping[str, float]]:
         """Frequencies from the markers' periodogram (from the force without markers); inclusions under every site."""
-        if candidate.name == "support-motion":
+        if candidate.spectral is not None:
+            path, most = candidate.spectral
             vertical = [s for s in self.segments if s.recording in self.fitted and s.component.endswith("z")]
             marks = [s for s in vertical if s.channel == "markers"] or vertical
             series = [(s.time - s.time[0], (self.y - prediction)[s.rows] / self.sigma[s.rows]) for s in marks]
-            return [{"effects.support-motion.frequency": f} for f in lines(series, 1)]
-        if candidate.name == "inclusion":
-            return places(self.sites, {n: float(self.ready.setups[n].test.height) for n in self.fitted})
+            return [{path: f} for f in lines(series, most)]
+        if candidate.placed is not None:
+            effect = candidate.amplitudes[0].rsplit(".", 1)[0]
+            heights = {n: float(self.ready.setups[n].test.height) for n in self.fitted}
+            return [{f"{effect}.{k}": v for k, v in s.items()} for s in candidate.placed(self.sites, heights)]
         return candidate.grid

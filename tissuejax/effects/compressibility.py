@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
-from tissuejax.effects.form import Form, Offer, Probed, Sizes
+from tissuejax.effects.form import Form, Offer, Price, Probed, Sizes
 from tissuejax.effects.history import fading
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.effects.probing_test import ProbingTest
@@ -32,6 +32,7 @@ class Compressibility(Effect):
     name: ClassVar[str] = "compressibility"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing"})
     searches: ClassVar[bool] = True
+    price: ClassVar[Price] = Price(3.0, memory=8.0)
     group: ClassVar[str] = "history"
     reveals: ClassVar[str] = "disagreement between tests of unlike constraint, relaxation that is absent in shear"
     blind: ClassVar[str] = "simple shear; uniaxial tests alone"

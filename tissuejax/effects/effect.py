@@ -13,7 +13,7 @@ import equinox as eqx
 from jaxtyping import Array, Float
 
 from tissuejax.effects.cutting_test import Cut
-from tissuejax.effects.form import Offer, Probed, Sizes
+from tissuejax.effects.form import Offer, Price, Probed, Sizes
 from tissuejax.effects.material_test import MaterialTest, Stress
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.energies.strain import Strain
@@ -52,6 +52,7 @@ class Effect(eqx.Module):
             of an effect that only corrects what was noted.
         standard: values that are meant where the effect is stated without any (weight: 9.81 m/s^2).
         searches: of material tests: whether it turns every prediction into a search.
+        price: how many times longer a prediction of a material test takes with that search.
         history: of material tests: whether its stress has a past, which a compiled program holds or not.
         added: of material tests: whether it is added to the reported stress last, so that its derivative needs nothing
             else.
@@ -84,6 +85,7 @@ class Effect(eqx.Module):
     misjudged: ClassVar[Mapping[str, float]] = {}
     standard: ClassVar[Mapping[str, float]] = {}
     searches: ClassVar[bool] = False
+    price: ClassVar[Price] = Price()
     history: ClassVar[bool] = False
     added: ClassVar[bool] = False
     group: ClassVar[str] = ""

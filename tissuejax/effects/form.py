@@ -7,12 +7,16 @@ effect is called to help.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from tissuejax.effects.effect import Effect
+
+Placed = Callable[[Mapping[str, np.ndarray], Mapping[str, float]], Sequence[Mapping[str, float]]]
 
 
 @dataclass(frozen=True)
@@ -28,6 +32,10 @@ class Form:
         reach: how many times beyond the values scanned (or the default) a positive shape may go.
         most: limits of exponents, which run away where the fitted recordings hardly reach them.
         beside: names of forms that it is tried beside, whatever the order.
+        spectral: a frequency that is read from the residual's periodogram, and how many of its lines are tried; of a
+            probing's markers where it has any.
+        placed: of probings: shapes that are scanned by where the probe went deepest: of these places by recording, m,
+            and the tissue's height there, m, settings of the shapes.
     """
 
     name: str
@@ -38,6 +46,21 @@ class Form:
     reach: float = 10.0
     most: Mapping[str, float] = field(default_factory=dict)
     beside: tuple[str, ...] = ()
+    spectral: tuple[str, int] | None = None
+    placed: Placed | None = None
+
+
+@dataclass(frozen=True)
+class Price:
+    """How many times longer a prediction of a material test takes where an effect makes a search of it; measured.
+
+    Attributes:
+        alone, memory, fibres: beside nothing else; beside stress with a history; beside an energy with directions.
+    """
+
+    alone: float = 1.0
+    memory: float = 1.0
+    fibres: float = 1.0
 
 
 @dataclass(frozen=True)

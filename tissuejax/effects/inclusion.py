@@ -4,13 +4,16 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
-from jaxtyping import Array
+import numpy as np
+from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
 from tissuejax.effects.form import Form, Offer, Probed
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.tled.scene import Scene
+
+DEPTHS = (0.25, 0.45, 0.7)  # below the surface, shares of the height, at which one is looked for
 
 
 class Inclusion(Effect):
@@ -39,8 +42,8 @@ class Inclusion(Effect):
     def in_probings(cls, sizes: Probed) -> Offer:
         """See `Effect.in_probings`."""
         round_ = ("contrast", "x", "y", "z", "radius")
-        flat = Form("flat", (*round_, "flatness"), nominated=False)
-        return Offer(cls(), (Form("round", round_, {"radius": (6e-3,)}), flat))
+        flat = Form("flat", (*round_, "flatness"), nominated=False, placed=under_sites)
+        return Offer(cls(), (Form("round", round_, {"radius": (6e-3,)}, placed=under_sites), flat))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -59,6 +62,16 @@ class Inclusion(Effect):
         s2 = jnp.sum(away**2, axis=1) / p["radius"] ** 2
         factor = jnp.exp(p["contrast"] * jnp.exp(-(s2**2)))
         return scene.put({"tissue.stiffness": scene.stiffness * factor}).put(_mass(scene, test, factor))
+
+
+def under_sites(sites: Mapping[str, Float[np.ndarray, "2"]], height: Mapping[str, float]) -> list[dict[str, float]]:
+    """Where it is looked for: under the place of every recording, at three shares of the tissue's height, m."""
+    found = []
+    for name, (x, y) in sites.items():
+        for share in DEPTHS:
+            radius = float(np.clip(0.25 * height[name], 3e-3, 1e-2))
+            found.append({"x": float(x), "y": float(y), "z": float(height[name] * (1 - share)), "radius": radius})
+    return found
 
 
 def _mass(scene: Scene, test: ProbingTest, factor: Array) -> dict[str, Array]:

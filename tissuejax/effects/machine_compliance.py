@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from tissuejax.effects.cutting_test import Cut
 from tissuejax.effects.effect import Effect, Respond
-from tissuejax.effects.form import Form, Offer, Probed, Sizes
+from tissuejax.effects.form import Form, Offer, Price, Probed, Sizes
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
@@ -33,6 +33,7 @@ class MachineCompliance(Effect):
     name: ClassVar[str] = "machine-compliance"
     kinds: ClassVar[frozenset[str]] = frozenset({"homogeneous", "probing", "cutting"})
     searches: ClassVar[bool] = True
+    price: ClassVar[Price] = Price(5.0, memory=8.0, fibres=8.0)
     group: ClassVar[str] = "rig"
     displaces: ClassVar[tuple[str, ...]] = ("compliance",)
     remembers: ClassVar[bool] = False

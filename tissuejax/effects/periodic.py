@@ -48,8 +48,8 @@ class Periodic(Effect):
         """See `Effect.in_material_tests`."""
         both = ("sin", "cos", "sin2", "cos2")
         forms = (
-            Form("", ("sin", "cos", "frequency"), each=("sin", "cos")),
-            Form("two harmonics", (*both, "frequency"), nominated=False, each=both),
+            Form("", ("sin", "cos", "frequency"), each=("sin", "cos"), spectral=("frequency", 3)),
+            Form("two harmonics", (*both, "frequency"), nominated=False, each=both, spectral=("frequency", 3)),
         )
         lower = CYCLES / sizes.recording
         upper = max(0.25 / sizes.step, 2 * lower)

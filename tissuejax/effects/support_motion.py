@@ -43,7 +43,8 @@ class SupportMotion(Effect):
     def in_probings(cls, sizes: Probed) -> Offer:
         """See `Effect.in_probings`."""
         waves = cls.amplitudes
-        return Offer(cls(), (Form("", (*waves, "lean_x", "lean_y", "frequency"), each=waves),))
+        form = Form("", (*waves, "lean_x", "lean_y", "frequency"), each=waves, spectral=("frequency", 1))
+        return Offer(cls(), (form,))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
