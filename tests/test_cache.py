@@ -18,8 +18,10 @@ from tissuejax.effects.drift import Drift
 from tissuejax.energies.catalogue import energy
 from tissuejax.energies.fibre import WithFibre
 from tissuejax.energies.neo_hookean import NeoHookean
+from tissuejax.errors import InputError
 from tissuejax.estimation.series import Segment
 from tissuejax.model import Model
+from tissuejax.surrogate.live import compiler
 
 
 @pytest.fixture
@@ -277,6 +279,15 @@ def test_a_folder_of_another_user_is_refused(kept_in, monkeypatch):
     with pytest.warns(UserWarning, match="belongs to another user"):
         Kept(Counted(), "twice")(A, B)
     assert not kept_in.exists()
+
+
+def test_no_program_is_run_from_a_folder_that_others_may_write(tmp_path, monkeypatch):
+    monkeypatch.setenv(programs.ENVIRONMENT, str(tmp_path))
+    (tmp_path / "compiled").mkdir()
+    (tmp_path / "compiled").chmod(0o777)
+    with pytest.raises(InputError, match="compiled may be written by others"):
+        compiler.compiled("loop.c")
+    assert not list((tmp_path / "compiled").iterdir())
 
 
 def test_a_folder_is_made_for_its_user_alone(tmp_path, monkeypatch):

@@ -19,6 +19,8 @@ def test_names_give_energies_and_back():
     for name in ("neo-hookean", "reduced-polynomial-4", "polynomial-3", "gent+fibre", "demiray+fibre"):
         assert catalogue.name_of(catalogue.energy(name)) == name
     assert catalogue.energy("yeoh") == catalogue.energy("reduced-polynomial-3")
+    assert catalogue.energy("Neo Hooke") == catalogue.energy("neo-hookean")
+    assert catalogue.energy("OGDEN-3+Fibre", "mu/alpha") == catalogue.energy("ogden-3+fibre", "mu/alpha")
     assert catalogue.name_of(catalogue.energy("ogden-3+fibre", "c/m^2")) == "ogden-3+fibre"
     assert catalogue.forms_of(catalogue.energy("ogden-3+fibre", "c/m^2")) == {
         "ogden": "c/m^2",

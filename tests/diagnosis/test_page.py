@@ -64,6 +64,8 @@ def test_sentences_say_how_sure_and_against_what(relaxing):
     lines = " ".join(judged_sentences.sure(relaxing))
     assert "The most probable is given" in lines
     assert "Probability that an effect is present" in lines
+    found = re.search(r"misfit over the stated noise: ([\d.]+) .*with .* alone, ([\d.]+) .*with relax", lines)
+    assert float(found[1]) > 1.5 > 1.1 > float(found[2]) > 0.9
     assert "second specimen" in sentences.next_steps(relaxing)[0]
 
 

@@ -48,6 +48,8 @@ REFUSED = {
     "negative noise": (["sensitivity", "--published", "in-vivo-1", "--noise", "-1"], ["--noise", "above zero"]),
     "no jobs": (["challenge", "grade", "x", "--jobs", "0"], ["--jobs", "1 or more"]),
     "nan": (["fit", ELASTIC, "--energy", "neo-hookean", "--start", "energy.mu=nan"], ["--start", "number"]),
+    "a file for a folder": (["energies", "--plot", "neo-hookean", "--out", "e.png"], ["--out", "e.png", "folder"]),
+    "cards into a file": (["export", "--published", "in-vivo-1", "--out", "a.inp"], ["--out", "a.inp", "--to"]),
     "only": (["diagnose", ELASTIC, "--energy", "neo-hookean", "--only", "tensoin"], ["'tension'"]),
 }
 
@@ -113,6 +115,22 @@ def test_names_that_can_not_be_file_names(name, tmp_path):
     )
     with pytest.raises(InputError, match="name of a sample"):
         read(tmp_path / "t.toml")
+
+
+def test_a_noise_of_nothing_beside_others_is_refused(tmp_path, capsys):
+    path = tmp_path / "no-noise.h5"
+    path.write_bytes(Path(ELASTIC).read_bytes())
+    with h5py.File(path, "r+") as file:
+        file["recordings/tension/nominal_stress"].attrs["noise_std"] = 0.0
+    assert main(["fit", str(path), "--energy", "neo-hookean", "--out", str(tmp_path / "o")]) == 2
+    said = capsys.readouterr().err
+    assert "recording tension" in said
+    assert "--weights uniform" in said
+
+
+def test_one_card_goes_into_the_file_named(tmp_path, capsys):
+    assert main(["export", "--published", "in-vivo-1", "--to", "abaqus", "--out", str(tmp_path / "liver.inp")]) == 0
+    assert "*MATERIAL" in (tmp_path / "liver.inp").read_text().upper()
 
 
 def test_a_file_that_points_at_other_files_is_refused(tmp_path):

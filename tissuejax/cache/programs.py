@@ -58,18 +58,24 @@ def own(where: Path) -> bool:
 
     A kept program is code: whoever can write the folder could have this user run another one.
     """
+    whose = strangers(where)
+    if whose:
+        warnings.warn(
+            f"{where} {whose}, so no compiled programs are kept or taken there: `chmod go-w` it, or name another "
+            f"folder in {ENVIRONMENT}",
+            stacklevel=3,
+        )
+    return not whose
+
+
+def strangers(where: Path) -> str:
+    """Who else may write in a folder, in words; empty if nobody, or if there is no such folder."""
     if not hasattr(os, "getuid") or not where.exists():
-        return True
+        return ""
     seen = where.stat()
-    if seen.st_uid == os.getuid() and not seen.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        return True
-    whose = "belongs to another user" if seen.st_uid != os.getuid() else "may be written by others"
-    warnings.warn(
-        f"{where} {whose}, so no compiled programs are kept or taken there: `chmod go-w` it, or name another folder "
-        f"in {ENVIRONMENT}",
-        stacklevel=3,
-    )
-    return False
+    if seen.st_uid != os.getuid():
+        return "belongs to another user"
+    return "may be written by others" if seen.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else ""
 
 
 def forget_programs() -> None:

@@ -9,6 +9,7 @@ from tissuejax import verbs
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.diagnose import diagnosed
 from tissuejax.commands.fitting import SUSPECT, reply
+from tissuejax.commands.outputs import folder_named
 from tissuejax.errors import InputError
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read
@@ -35,7 +36,7 @@ Read the pages in a browser.
     def arguments(self, parser: argparse.ArgumentParser) -> None:
         """--out."""
         parser.add_argument(
-            "--out", "-o", type=Path, default=Path("out/demo"), metavar="FOLDER", help="default: out/demo"
+            "--out", "-o", type=folder_named, default=Path("out/demo"), metavar="FOLDER", help="default: out/demo"
         )
 
     def run(self, given: argparse.Namespace) -> Reply:

@@ -7,6 +7,7 @@ from typing import ClassVar
 from tissuejax import verbs
 from tissuejax.commands.arguments import values
 from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.outputs import folder_named
 from tissuejax.energies.catalogue import entries
 from tissuejax.energies.published import PUBLISHED
 from tissuejax.errors import InputError
@@ -42,7 +43,7 @@ fibre family to any of them. Ogden constants mean nothing without their form, so
             "--stretch", default="0.6:1.6", metavar="LOW:HIGH", help="range of the picture (default 0.6:1.6)"
         )
         parser.add_argument(
-            "--out", "-o", type=Path, default=Path("out"), metavar="FOLDER", help="where the picture goes"
+            "--out", "-o", type=folder_named, default=Path("out"), metavar="FOLDER", help="where the picture goes"
         )
 
     def run(self, given: argparse.Namespace) -> Reply:

@@ -26,6 +26,7 @@ has no card for is refused with the reason.
 
   tissuejax export out/liver/result.json                              a card for every solver that has one
   tissuejax export out/liver/result.json --to abaqus --units mm-t-s
+  tissuejax export out/liver/result.json --to abaqus --out liver.inp  the one card into this file
   tissuejax export --published in-vivo-3 --to febio
   tissuejax export --energy neo-hookean --set "energy.mu=3 kPa" --to calculix --bulk "150 kPa" --density "1060 kg/m^3"
 
@@ -41,7 +42,9 @@ solver can; elsewhere it gets a bulk modulus of 1000 shear moduli, said in the c
         parser.add_argument("--density", metavar="VALUE", help='e.g. "1060 kg/m^3"')
         parser.add_argument("--bulk", metavar="VALUE", help='bulk modulus for an incompressible fit, e.g. "150 kPa"')
         parser.add_argument("--name", metavar="NAME", help="of the material in the card (default: the sample's)")
-        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="default: out/NAME-cards")
+        parser.add_argument(
+            "--out", "-o", type=Path, metavar="FOLDER", help="default: out/NAME-cards; one card: or a file"
+        )
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Convert, write, say what was refused."""
@@ -51,6 +54,12 @@ solver can; elsewhere it gets a bulk modulus of 1000 shear moduli, said in the c
         name = given.name or of.name
         subject = material(of.model, of.values, name, density, given.units, bulk)
         out, written, refused = given.out or Path("out") / f"{name}-cards", {}, {}
+        endings = {Path(f"a{card(solver).suffix}").suffix for solver in cards()}
+        single = given.out is not None and given.out.suffix.lower() in endings and not given.out.is_dir()
+        if single and len(given.to or cards()) > 1:
+            raise InputError(
+                f"--out {out}: is a file, and several cards are written; name a folder, or one solver in --to"
+            )
         for solver in given.to or cards():
             try:
                 text = card(solver).text(subject)
@@ -59,7 +68,7 @@ solver can; elsewhere it gets a bulk modulus of 1000 shear moduli, said in the c
                     raise
                 refused[solver] = str(error)
                 continue
-            written[solver] = write_text(out / f"{subject.name}-{solver}{card(solver).suffix}", text)
+            written[solver] = write_text(out if single else out / f"{subject.name}-{solver}{card(solver).suffix}", text)
         if not written:
             raise InputError("no solver has a card: " + "; ".join(refused.values()))
         lines = [f"{solver:<10}{path}" for solver, path in written.items()]

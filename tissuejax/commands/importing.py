@@ -131,6 +131,7 @@ def _said(guess: Guess, side: Path, given: argparse.Namespace) -> Reply:
     record = {"side_file": str(side), "assumed": list(guess.said), "lacking": list(guess.lacking), "remarks": []}
     if guess.lacking:
         options = " ".join(f"--{name} ..." for name in guess.lacking)
+        options = options.replace("--area ...", "--area ... (or --diameter ...)")
         lines += ["", f"wrote {side}, which still needs: {', '.join(guess.lacking)}. Write them into the lines marked"]
         now = f", or give them now: tissuejax import {table} {options} --force"
         lines.append("FILL IN" + (", and look at what each column is." if guess.experiment == "cutting" else now))

@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.outputs import folder_named
 from tissuejax.recordings.files import names, read
 from tissuejax.recordings.layouts import LAYOUTS
 from tissuejax.recordings.recording import Recording, Sample
@@ -36,7 +37,7 @@ what is wrong with a file.
             "file", metavar="FILE", help="recording file or side file; FILE#NAME for one sample of many"
         )
         parser.add_argument(
-            "--out", "-o", type=Path, metavar="FOLDER", help="write the figure here (default: no figure)"
+            "--out", "-o", type=folder_named, metavar="FOLDER", help="write the figure here (default: no figure)"
         )
 
     def run(self, given: argparse.Namespace) -> Reply:

@@ -24,9 +24,24 @@ RECORDS = {  # the file in which a verb says what it made; those with a page sha
 WITH_A_PAGE = ("result.json", "comparison.json", "campaign.json")
 
 
+ENDINGS = {".png", ".svg", ".pdf", ".csv", ".json", ".html", ".h5", ".txt", ".inp", ".xlsx", ".mat"}
+
+
+def folder_named(text: str) -> Path:
+    """What was typed after --out, as argparse reads it: a folder, so no name of a file.
+
+    Raises:
+        argparse.ArgumentTypeError: it ends as a file does and is no folder.
+    """
+    path = Path(text)
+    if path.suffix.lower() in ENDINGS and not path.is_dir():
+        raise argparse.ArgumentTypeError(f"found {text}, expected a folder: several files are written into it")
+    return path
+
+
 def add_out(parser: argparse.ArgumentParser, default: str) -> None:
     """--out and --force."""
-    parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help=f"default: {default}")
+    parser.add_argument("--out", "-o", type=folder_named, metavar="FOLDER", help=f"default: {default}")
     parser.add_argument("--force", action="store_true", help="overwrite another result in --out")
 
 

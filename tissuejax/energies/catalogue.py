@@ -17,6 +17,7 @@ from tissuejax.parameters import Parameter
 
 ALIASES = {
     "yeoh": "reduced-polynomial-3",
+    "neo-hooke": "neo-hookean",
     "holzapfel-gasser-ogden": "hgo",
     "gasser-ogden-holzapfel": "goh",
 }
@@ -36,13 +37,13 @@ def energy(name: str, ogden_form: str | None = None) -> Energy:
     """The energy called `name`, e.g. "reduced-polynomial-2" or "ogden-3+fibre".
 
     Args:
-        name: as on the command line; orders are written at the end, `+fibre` after that.
+        name: as on the command line, in small or large letters; orders are written at the end, `+fibre` after that.
         ogden_form: for `ogden-N` only, and there required: one of `ogden.FORMS`.
 
     Raises:
         InputError: unknown name (the nearest are offered), an order missing or not wanted, an Ogden form likewise.
     """
-    stem, plus, addition = name.partition("+")
+    stem, plus, addition = name.strip().lower().replace(" ", "-").partition("+")
     additions = {n: kind for n, kind in members(package, Energy).items() if n.startswith("+")}
     if plus and f"+{addition}" not in additions:
         raise unknown("addition to an energy", f"+{addition}", additions)

@@ -11,13 +11,13 @@ from tissuejax.report.scales import display, with_std
 def summary(found: Fit) -> str:
     """Two or three sentences for a reader in a hurry."""
     problem = found.problem
-    n = len(problem.predictor.names)
+    n, k = len(problem.predictor.names), len(found.free)
     energy = problem.predictor.model.energy
     effects = [effect.name for effect in problem.predictor.model.effects]
     with_effects = f" with {', '.join(effects)}" if effects else ""
     text = (
         f"The {name_of(energy)} energy{with_effects} was fitted to {n} recording{'s' * (n != 1)} of "
-        f"{problem.predictor.sample.name} ({problem.n_samples} samples, {len(found.free)} free parameters). "
+        f"{problem.predictor.sample.name} ({problem.n_samples} samples, {k} free parameter{'s' * (k != 1)}). "
     )
     text += f"{overall(found)} "
     if found.holdout:

@@ -8,6 +8,7 @@ import tempfile
 from importlib.resources import files
 from pathlib import Path
 
+from tissuejax.cache.programs import ENVIRONMENT, strangers
 from tissuejax.errors import InputError
 
 FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-Wall", "-Wextra")
@@ -45,11 +46,16 @@ def compiled(name: str, shared: bool = False) -> Path:
     """The program (or shared library) made of `name`.
 
     Raises:
-        InputError: no compiler, or one that refuses the file (its words are shown).
+        InputError: no compiler, one that refuses the file (its words are shown), or a folder others may write.
     """
     cc, text = compiler(), source(name).read_bytes() + source("tissuejax_force.h").read_bytes()
     key = hashlib.sha256(text + repr((cc, FLAGS, shared)).encode()).hexdigest()[:16]
     target = folder() / f"{Path(name).stem}-{key}{'.so' if shared else ''}"
+    if whose := strangers(target.parent):
+        raise InputError(
+            f"{target.parent} {whose}, and programs are run from there: `chmod go-w` it, or name another folder in "
+            f"{ENVIRONMENT}"
+        )
     if target.is_file():
         return target
     target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
