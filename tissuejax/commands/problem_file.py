@@ -16,7 +16,7 @@ from pathlib import Path
 
 from tissuejax.errors import InputError
 
-ENDINGS = (".yaml", ".yml")
+YAML = (".yaml", ".yml")
 VERBS = ("fit", "diagnose", "compare", "campaign")
 # Options that a verb doesn't have are left out, since one file serves all of them.
 _OF_FITS = {"weights", "loss", "method", "multistart", "max-steps", "seed", "stable", "channel"}
@@ -60,7 +60,7 @@ def expanded(argv: Sequence[str]) -> list[str]:
     argv = list(argv)
     words = [k for k, word in enumerate(argv) if not word.startswith("-")]
     named = 2 if words and argv[words[0]] == "campaign" else 1  # the action stands before the file
-    if len(words) <= named or argv[words[0]] not in VERBS or not argv[words[named]].lower().endswith(ENDINGS):
+    if len(words) <= named or argv[words[0]] not in VERBS or not argv[words[named]].lower().endswith(YAML):
         return argv
     path = Path(argv[words[named]])
     problem = read_problem(path)
