@@ -65,6 +65,8 @@ def test_failures_are_rows_and_only_what_is_missing_is_done(tmp_path):
     lost = store.planned()[0][2]
     store.path(lost.key).unlink()
     assert go_on(tmp_path / "c")["ran"] == 1
+    assert main(["campaign", "report", str(tmp_path / "c")]) == 0
+    assert "energy.mu (Pa),std energy.mu (Pa)" in (tmp_path / "c" / "cases.csv").read_text().splitlines()[0]
     begin(tmp_path / "c", files, Settings("fit", "neo-hookean", multistart=1, seed=1))  # other settings, other keys
     assert status(tmp_path / "c")["missing"] == 6
     assert main(["campaign", "report", str(tmp_path / "c"), "--json"]) == 0

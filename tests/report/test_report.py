@@ -181,3 +181,10 @@ def test_markers_at_rest_are_shown_at_rest(rng):
     again, _ = displacements(noisy, None)
     assert np.isfinite(again[20])
     assert np.isnan(again[30])
+
+
+def test_what_rests_is_drawn_over_stretch_and_over_time():
+    sample = tj.read(ROOT / "data" / "demo" / "elastic.h5")
+    figure = Overview().draw(Overview().prepare(sample))
+    shown = [ax.get_xlabel() for ax in figure.axes if ax.get_visible()]
+    assert shown == ["stretch", "time (s)"] * 4  # two columns: each recording has a row

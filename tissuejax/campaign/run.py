@@ -66,6 +66,15 @@ def status(folder: Path) -> dict[str, Any]:
     return counts
 
 
+def units(folder: Path) -> dict[str, str]:
+    """Units of the parameters in the table, from the first fit that gave an answer."""
+    store = Store(folder)
+    for _, row in store.rows(store.planned()[0]):
+        if row is not None and row["status"] == "done" and "parameters" in row["answer"]:
+            return {path: p["unit"] for path, p in row["answer"]["parameters"].items() if p.get("unit", "1") != "1"}
+    return {}
+
+
 def table(folder: Path) -> list[dict[str, Any]]:
     """One row a case: sample, status, chi-square, parameters with their errors; for a diagnosis the verdict."""
     store, found = Store(folder), []

@@ -28,6 +28,8 @@ class Abaqus(Card):
         body = [f"*MATERIAL, NAME={subject.name}"]
         if subject.density is not None:
             body += ["*DENSITY", number(subject.density)]
+        if subject.volumetric is None:
+            body.insert(0, "** D = 0, incompressible: hybrid elements (C3D8H, ...); Abaqus/Explicit wants a D")
         return body + hyperelastic(self, subject, ABAQUS_MAX, ABAQUS_MAX, moduli=bool(subject.prony)) + _prony(subject)
 
 

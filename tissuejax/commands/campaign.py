@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from tissuejax import verbs
-from tissuejax.campaign.run import begin, engines, go_on, status, table
+from tissuejax.campaign.run import begin, engines, go_on, status, table, units
 from tissuejax.campaign.store import PLAN, Store
 from tissuejax.campaign.task import Settings
 from tissuejax.commands.arguments import add_fit, add_model, fit_options, positive
@@ -138,7 +138,8 @@ def _refuse_another(folder: Path, settings: Settings) -> None:
 
 
 def _text(counts: dict) -> str:
-    lines = [f"{counts['cases']} cases: {counts['done']} done, {counts['failed']} failed, {counts['missing']} missing"]
+    cases = f"{counts['cases']} case{'s' * (counts['cases'] != 1)}"
+    lines = [f"{cases}: {counts['done']} done, {counts['failed']} failed, {counts['missing']} missing"]
     lines += [f"  ! {sample}: {reason}" for sample, reason in list(counts["failures"].items())[:20]]
     return "\n".join(lines)
 
@@ -146,7 +147,9 @@ def _text(counts: dict) -> str:
 def _report(folder: Path) -> Reply:
     from tissuejax.report.cohort_page import write_cohort
 
-    rows = table(folder)
+    of = units(folder)
+    named = {**of, **{f"std {path}": unit for path, unit in of.items()}}
+    rows = [{f"{n} ({named[n]})" if n in named else n: v for n, v in row.items()} for row in table(folder)]
     columns = list(dict.fromkeys(name for row in rows for name in row))
     text = io.StringIO()
     writer = csv.DictWriter(text, columns)

@@ -104,6 +104,11 @@ def diagnosed(found: Diagnosis, written: dict[str, Path]) -> Reply:
         f"  {r['path']:<40}{r['value']:>24} {r['unit']:<6}{r['note'] or r['interval']}".rstrip()
         for r in sentences.parameters(found)
     ]
+    if found.verdict.chosen:
+        lines += ["", f"{found.energy}, alone and with what was missing:"]
+        lines += [
+            f"  {r['path']:<24}{r['before']:>16}{r['after']:>24} {r['unit']}".rstrip() for r in sentences.base(found)
+        ]
     lines += ["", *judged.sure(found), ""]
     lines += [f"page     {written['page']}", f"numbers  {written['result']}"]
     record = found.as_dict() | {

@@ -74,7 +74,8 @@ solver can; elsewhere it gets a bulk modulus of 1000 shear moduli, said in the c
         lines = [f"{solver:<10}{path}" for solver, path in written.items()]
         lines += [f"  ! {solver}: {why}" for solver, why in refused.items()]
         lines += [f"  ! {note}" for note in subject.notes]
-        warned = [w for w in of.record.get("warnings", ()) if "bound" in w or "unstable" in w.lower()]
+        doubts = ("bound", "unstable", "misfit exceeds")
+        warned = [w for w in of.record.get("warnings", ()) if any(d in w.lower() for d in doubts)]
         lines += [f"  ! of the fit: {warning}" for warning in warned]
         record = {
             "cards": {s: str(p) for s, p in written.items()},

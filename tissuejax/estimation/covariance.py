@@ -174,19 +174,18 @@ def unseen(
 ) -> str:
     """A plain sentence on one direction (in relative parameters) that the data leave open."""
     who = [i for i in np.argsort(-np.abs(direction)) if abs(direction[i]) > SHARE * np.abs(direction).max()]
-    amount = (
-        "hardly changes the prediction" if relative_std > 10 else f"is only known to within {100 * relative_std:.0f} %"
+    how = (
+        "hardly shows in the prediction" if relative_std > 10 else f"is known to within {100 * relative_std:.0f} % only"
     )
     if len(who) == 1:
-        return f"{labels[who[0]]} is not identified by these recordings: changing it {amount}."
+        return f"{labels[who[0]]} is not identified by these recordings: it {how}."
     if len(who) == 2:
         i, j = sorted(who)
         return (
-            f"only {seen_pair(direction, size, labels, units, i, j)} is seen: moving along it one against "
-            f"the other {amount}."
+            f"only {seen_pair(direction, size, labels, units, i, j)} is seen: a change of one against the other {how}."
         )
     moves = ", ".join(f"{labels[i]} by {100 * direction[i] / np.abs(direction).max():+.0f} %" for i in sorted(who))
-    return f"one combination is not identified: changing {moves} together {amount}."
+    return f"one combination is not identified: a change of {moves} together {how}."
 
 
 def seen_pair(direction, size, labels, units, i: int, j: int) -> str:

@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tissuejax.report.plot import HELD, INK, MODEL, Plot, grid
-from tissuejax.report.scales import label
+
+TITLES = {"chi2_per_dof": "chi-square per degree of freedom"}
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class CohortSpread(Plot):
 
     def caption(self, data: dict[str, np.ndarray]) -> str:
         """What the line is."""
-        return "Spread over the samples, SI units; the line is the median. One value is one sample."
+        return "Spread over the samples; the line is the median. One value is one sample."
 
     def draw(self, data: dict[str, np.ndarray]) -> Figure:
         """One panel a column."""
@@ -45,6 +46,6 @@ class CohortSpread(Plot):
             ax.hist(values, min(40, max(8, len(values) // 5)), color=MODEL, alpha=0.8)
             ax.axvline(np.median(values), color=HELD, linewidth=1.5)
             ax.set_title(f"{name}, median {np.median(values):.4g}", loc="left", fontsize=9, color=INK)
-            ax.set_xlabel(f"{name.split('.')[-1]}{label('1')}")
+            ax.set_xlabel(TITLES.get(name, name.split(".")[-1]))
             ax.set_ylabel("samples")
         return figure

@@ -14,8 +14,9 @@ def write_cohort(rows: list[dict[str, Any]], counts: dict[str, Any], out: Path) 
     """report.html and the figures; their paths by name."""
     drawn = figures(Cohort(tuple(rows)))
     columns = [n for n in dict.fromkeys(n for row in rows for n in row) if not n.startswith("std ")]
+    name = out.parent.name if out.name == "campaign" else out.name  # of a problem file: out/liver/campaign
     page = render(
-        "cohort.html.j2", title=f"Campaign {out.name}", counts=counts, rows=rows[:ROWS], columns=columns, most=ROWS,
+        "cohort.html.j2", title=f"Campaign {name}", counts=counts, rows=rows[:ROWS], columns=columns, most=ROWS,
         figures=drawn,
     )  # fmt: skip
     written = {f["name"]: write_bytes(out / f"{f['name']}.png", f["png"]) for f in drawn}

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 
 from tissuejax.fitting.comparison import Comparison
-from tissuejax.report.plot import INK, MEASURED, SERIES, Plot, clock, grid
+from tissuejax.report.plot import INK, MEASURED, SERIES, Plot, clock, grid, legend_below
 from tissuejax.report.scales import display, label
 from tissuejax.report.series import Curve, curves
 
@@ -49,18 +49,22 @@ class ComparisonCurves(Plot):
         return f"Measured (grey points) and {len(data.predicted)} models, the best supported first in the legend."
 
     def draw(self, data: Overlay) -> Figure:
-        """Against stretch or shear; against time where the drive rests."""
-        figure, axes = grid(len(data.measured), columns=min(3, len(data.measured)))
-        for k, (ax, curve) in enumerate(zip(axes, data.measured, strict=True)):
+        """A row a series: left against stretch or shear where there is one, right against time."""
+        both = any(c.drive is not None for c in data.measured)
+        figure, axes = grid(len(data.measured) * (2 if both else 1), columns=2, height=2.5)
+        panels = [(k, by_time) for k in range(len(data.measured)) for by_time in ((False, True) if both else (True,))]
+        for ax, (k, by_time) in zip(axes, panels, strict=True):
+            curve = data.measured[k]
             factor, unit = display(curve.unit, float(np.nanmax(np.abs(curve.measured), initial=0.0)))
-            by_time = curve.drive is None or curve.held_still
             x = curve.time if by_time else curve.drive
+            if x is None:
+                ax.set_visible(False)
+                continue
             ax.plot(x, curve.measured / factor, ".", color=MEASURED, markersize=3, alpha=0.6, label="measured")
             for colour, (name, every) in zip(SERIES, data.predicted.items(), strict=False):
                 ax.plot(x, every[k] / factor, color=colour, linewidth=1.3, label=name)
             ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontsize=9.5, color=INK)
             ax.set_xlabel(clock(curve.timed) if by_time else curve.drive_name)
             ax.set_ylabel(f"{curve.channel.replace('_', ' ')}{label(unit)}")
-        handles, names = axes[0].get_legend_handles_labels()
-        figure.legend(handles, names, loc="outside lower center", ncols=min(4, len(names)), frameon=False, fontsize=8)
+        legend_below(figure, axes, columns=4)
         return figure

@@ -6,9 +6,11 @@ from typing import ClassVar
 
 from matplotlib.figure import Figure
 
-from tissuejax.fitting.comparison import TELLS, Comparison
+from tissuejax.fitting.comparison import TELLS, Comparison, Row
 from tissuejax.report.plot import HELD, INK, MODEL, PAPER, Plot, tidy
 from tissuejax.report.scales import display
+
+NOTED = 2  # open directions said of a model
 
 
 @dataclass(frozen=True)
@@ -82,10 +84,11 @@ def verdict(found: Comparison) -> str:
     """Which model to take, and what that rests on, in two or three sentences."""
     best, rest = found.best, found.rows[1:]
     text = f"Of {len(found.rows)} models of {found.sample} the data support {best.name} most"
+    text += f" (Akaike weight {best.weight:.2f})"
     near = [r for r in rest if -2 * (_log(r.weight) - _log(best.weight)) < TELLS]
     if near:
-        text += f", but {', '.join(r.name for r in near)} about as well (a difference in AIC below {TELLS:g})"
-    text += f" (Akaike weight {best.weight:.2f}). "
+        text += f", but {', '.join(r.name for r in near)} about as well (differences in AIC below {TELLS:g})"
+    text += ". "
     if found.inflation > 1.3:
         text += (
             f"None of them reaches the noise (least chi-square per degree of freedom {found.inflation:.3g}), so the "
@@ -127,7 +130,18 @@ def lines(found: Comparison) -> list[dict[str, str]]:
             "chi2": "" if r.chi2_per_dof is None else f"{r.chi2_per_dof:.4g}",
             "fitted": rmse(r.fitted),
             "held": rmse(r.held),
-            "note": "; ".join(([] if r.status == "converged" else [f"not converged: {r.status}"]) + list(r.warnings)),
+            "note": _note(r),
         }
         for r in found.rows
     ]
+
+
+def _note(row: Row) -> str:
+    """What to know of a fit before taking it, briefly: its own page says it all."""
+    said = [] if row.status == "converged" else [f"not converged: {row.status}."]
+    bounds = [w for w in row.warnings if w.endswith(" bound")]
+    others = [w for w in row.warnings if w not in bounds]
+    said += [f"{', '.join(bounds)}."] * bool(bounds) + others[:NOTED]
+    if len(others) > NOTED:
+        said.append(f"{len(others) - NOTED} more directions are open: too many parameters for these data.")
+    return " ".join(said)

@@ -94,10 +94,9 @@ def draw_shown(ax, shown: Shown, by_time: bool) -> None:
     ax.set_ylabel(f"{curve.channel.replace('_', ' ')}{label(unit)}")
 
 
-def draw_curve(ax, curve: Curve) -> None:
-    """One series on one axis, against stretch or shear, or against time where the drive rests."""
+def draw_curve(ax, curve: Curve, by_time: bool) -> None:
+    """One series on one axis, against time or else against stretch or shear."""
     factor, unit = display(curve.unit, float(np.nanmax(np.abs(curve.measured), initial=0.0)))
-    by_time = curve.drive is None or curve.held_still
     x = curve.time if by_time else curve.drive
     thin = slice(None, None, max(1, len(x) // DENSE_OVERLAY))
     ax.plot(x[thin], curve.measured[thin] / factor, ".", color=MEASURED, markersize=3.5, zorder=2)

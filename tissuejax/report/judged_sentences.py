@@ -27,6 +27,8 @@ PARTS = {
     "onset": "where the surface is met",
 }
 
+SEEN = 1e-5  # of the peak: no sensor tells less, and an amplitude at its bound is rounding
+
 
 def _part(name: str) -> str:
     if name not in PARTS and name.startswith("at once in "):
@@ -58,6 +60,8 @@ def size(d: Diagnosis) -> str:
             value, unit = value / big, word
             break
     share = f"{100 * rest['share_of_peak']:.2g} %"
+    if rest["share_of_peak"] < SEEN:
+        return f"less than {100 * SEEN:g} % of the largest {'stress' if 'Pa' in unit else 'values'}"
     if unit == "1":  # forces and markers together
         return f"{share} of the largest force and displacement, root mean square"
     return f"{value:.3g} {unit} root mean square, {share} of the largest {'stress' if 'Pa' in unit else 'force'}"
@@ -67,9 +71,9 @@ def lead(d: Diagnosis) -> str:
     """The verdict in one or two sentences."""
     a = d.answered
     j = a.judgement
-    removed = f"explains {a.explained[0]:.0%} of what {d.energy} misses in the fitted recordings"
+    removed = f"explains {100 * a.explained[0]:.0f} % of what {d.energy} misses in the fitted recordings"
     if a.bench.held_out:
-        removed += f" and {a.explained[1]:.0%} in the held-out ones"
+        removed += f" and {100 * a.explained[1]:.0f} % in the held-out ones"
     if j.kind is Kind.NOTHING:
         return (
             f"Nothing is missing: {d.energy} predicts these recordings to within noise and what any law leaves "

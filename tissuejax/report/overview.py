@@ -32,11 +32,19 @@ class Overview(Plot):
         return f"{shown} of {total} series." if shown < total else f"All {total} series."
 
     def draw(self, data: tuple[list[Curve], int]) -> Figure:
-        """One panel a series."""
-        figure, axes = grid(len(data[0]))
-        for ax, curve in zip(axes, data[0], strict=True):
-            draw_curve(ax, curve)
+        """A panel a series over time, and one over stretch or shear where it rests or turns, so that both are seen."""
+        panels = [(c, by_time) for c in data[0] for by_time in _ways(c)]
+        figure, axes = grid(len(panels), columns=2 if len(panels) == 2 * len(data[0]) else 3)
+        for ax, (curve, by_time) in zip(axes, panels, strict=True):
+            draw_curve(ax, curve, by_time)
         return figure
+
+
+def _ways(curve: Curve) -> tuple[bool, ...]:
+    """Over what a series is drawn: stretch (False), time (True), or both where one does not stand for the other."""
+    if curve.drive is None:
+        return (True,)
+    return (False,) if curve.monotone and not curve.held_still or not curve.timed else (False, True)
 
 
 def _nothing(curve: Curve, recording: Recording) -> bool:
