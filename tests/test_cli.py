@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tissuejax.cache import source
-from tissuejax.cli import commands, listed, main
+from tissuejax.cli import _warned, commands, listed, main
 
 ROOT = Path(__file__).parents[1]
 ELASTIC = str(ROOT / "data" / "demo" / "elastic.h5")
@@ -212,3 +212,9 @@ def test_a_study_notes_when_and_by_which_code_it_ran(tmp_path, capsys):
     assert noted["study.py"]["answer"] == "1 of 1 right"
     assert noted["study.py"]["source"] == source.LOADED
     assert abs(datetime.now(UTC) - datetime.fromisoformat(noted["study.py"]["date"])).total_seconds() < 600
+
+
+def test_a_warning_is_one_line_and_that_of_a_library_none(capsys):
+    _warned(UserWarning("the cache may be written by others"), UserWarning, "programs.py", 3)
+    _warned(FutureWarning("this library moves"), FutureWarning, "library.py", 3)
+    assert capsys.readouterr().err == "tissuejax: the cache may be written by others\n"

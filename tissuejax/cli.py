@@ -10,6 +10,7 @@ import importlib
 import json
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
@@ -125,6 +126,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     known = {entry.name: entry for entry in listed()}
     name = next((word for word in argv if not word.startswith("-")), "")
     if own:
+        warnings.showwarning = _warned
         watched(name)
     try:
         argv = expanded(argv)
@@ -153,6 +155,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader (head, less) has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return reply.code
+
+
+def _warned(message, category, filename, lineno, file=None, line=None) -> None:
+    """What the package warns of as one line; what its libraries tell their own callers is no user's business."""
+    if issubclass(category, UserWarning):
+        print(f"tissuejax: {message}", file=sys.stderr)
 
 
 def _refused(name: str, error: TissueError, as_json: bool) -> int:

@@ -5,9 +5,11 @@ rate once all have started and by the CPU time of a case, the second by the clie
 scheduler's with it); so on free cores the rate is the smaller of (workers / CPU time of a case) and (1 / client's time
 a case).
 
-tissuejax study fits/throughput          (CASES=1000 in the environment for a first look)
+tissuejax study fits/throughput          (CASES=1000 in the environment for a first look;
+                                          RUNS="processes-1 dask-2": only these, the others' results stay)
 """
 
+import json
 import os
 import resource
 import shutil
@@ -29,6 +31,7 @@ PART = min(1000, CASES)  # cases of every run but the largest
 RUNS = (("processes", 1, PART), ("processes", 2, PART), ("dask", 2, PART), ("processes", 4, CASES))
 STRETCH = np.linspace(1.0, 1.3, 40)
 NOISE = 10.0  # Pa
+ASKED = os.environ.get("RUNS", "").split()
 COLOURS = {"processes": "#1f6fb2", "dask": "#d9730d"}
 SIDE = """file = "tests.csv"
 sample = "{specimen}"
@@ -110,10 +113,14 @@ def load() -> float:
 
 def main(folder: Path) -> str:
     """Run, time, count; result.json and a figure."""
-    work, runs = folder.resolve().parents[1] / "out" / "throughput", []
+    work, kept = folder.resolve().parents[1] / "out" / "throughput", folder / "result.json"
+    before = json.loads(kept.read_text())["runs"] if ASKED and kept.is_file() else []
+    found = {f"{r['engine']}-{r['workers']}": r for r in before}
     for engine, workers, n in RUNS:
-        runs.append(timed(work, engine, workers, n))
-        write_json(folder / "result.json", {"cpus": os.cpu_count(), "runs": runs})
+        if not ASKED or f"{engine}-{workers}" in ASKED:
+            found[f"{engine}-{workers}"] = timed(work, engine, workers, n)
+            write_json(kept, {"cpus": os.cpu_count(), "runs": list(found.values())})
+    runs = list(found.values())
     write_figure(folder / "figures" / "throughput.png", drawn(runs), dpi=110)
     last = runs[-1]
     return f"{last['cases']} fits, {last['workers']} workers: {last['per_second']:.1f} a second"

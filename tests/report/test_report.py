@@ -86,6 +86,7 @@ def test_estimates_show_relative_errors_and_name_the_strongest_pair(found):
 def test_stress_of_the_energy_picture_is_the_textbook_one():
     model = tj.material("neo-hookean")
     data = EnergyCurves().prepare(Material(model, {"energy.mu": 2000.0}, (0.7, 1.5)))
+    assert data.constants == "mu = 2 kPa"
     l = data.stretch
     np.testing.assert_allclose(data.stress["uniaxial"], 2000.0 * (l - l**-2), rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(data.stress["planar"], 2000.0 * (l - l**-3), rtol=1e-9, atol=1e-9)

@@ -1,5 +1,6 @@
 """An energy with given constants: nominal stress in three modes, and where the material is stable."""
 
+import textwrap
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -14,6 +15,7 @@ from tissuejax.energies.stability import Stability, stability
 from tissuejax.errors import InputError
 from tissuejax.experiments.catalogue import experiment
 from tissuejax.model import Model
+from tissuejax.parameters import Parameter
 from tissuejax.recordings.recording import Channel, Recording
 from tissuejax.report.plot import INK, SERIES, Plot, grid
 from tissuejax.report.scales import display
@@ -42,9 +44,10 @@ class Material:
 
 @dataclass(frozen=True)
 class Curves:
-    """Stretch, stress by mode in Pa, stability, title."""
+    """Stretch, stress by mode in Pa, stability, title, constants in words."""
 
     title: str
+    constants: str
     stretch: Float[np.ndarray, " n"]
     stress: dict[str, Float[np.ndarray, " n"]]
     stability: Stability
@@ -74,11 +77,12 @@ class EnergyCurves(Plot):
             except InputError:
                 continue
             stress[mode] = np.where(valid, np.asarray(predicted), np.nan)
-        return Curves(name_of(subject.energy), base, stress, check)
+        said = ", ".join(_constant(p, subject.constants[p.name]) for p in subject.energy.parameters)
+        return Curves(name_of(subject.energy), said, base, stress, check)
 
     def caption(self, data: Curves) -> str:
         """The finding on stability."""
-        return f"Nominal stress of {data.title}, incompressible. {data.stability.sentence}"
+        return f"Nominal stress of {data.title} ({data.constants}), incompressible. {data.stability.sentence}"
 
     def draw(self, data: Curves) -> Figure:
         """Stress left, least eigenvalue of the stability test right."""
@@ -87,6 +91,7 @@ class EnergyCurves(Plot):
         factor, unit = display("Pa", float(size))
         for colour, (mode, stress) in zip(SERIES, data.stress.items(), strict=False):
             left.plot(data.stretch, stress / factor, color=colour, label=mode)
+        left.set_title(textwrap.fill(f"{data.title}: {data.constants}", 60), loc="left", fontsize=9.5, color=INK)
         left.set_xlabel("stretch")
         left.set_ylabel(f"nominal stress ({unit})")
         left.axhline(0, color=INK, linewidth=0.5)
@@ -100,3 +105,9 @@ class EnergyCurves(Plot):
         right.set_ylabel(f"least stiffness of Drucker's test ({unit})")
         right.set_title("unstable where below zero", loc="left", fontsize=9.5, color=INK)
         return figure
+
+
+def _constant(parameter: Parameter, value: float) -> str:
+    """ "C10 = 1 kPa"."""
+    factor, unit = display(parameter.unit, abs(value))
+    return f"{parameter.name} = {value / factor:.4g}" + ("" if unit == "1" else f" {unit}")
