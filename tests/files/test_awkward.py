@@ -103,13 +103,13 @@ def test_the_overview_leaves_out_what_was_not_measured(tmp_path):
 
 
 def test_samples_without_a_time_are_counted_on_the_axis(tmp_path):
-    held = np.where(T < 1000, U, 1.0)  # a hold: drawn over time
+    held = np.where(T < 1000, U, 1.0)  # a hold: drawn over stretch and over time
     rows = [f"{u},{f}" for u, f in zip(held, F, strict=True)]
     path = written(tmp_path / "my.csv", "Displacement (mm),Force (N)", *rows)
     assert main(["import", path, *SIZES]) == 0
     plot = Overview()
-    (ax,) = plot.draw(plot.prepare(read(tmp_path / "my.toml"))).axes
-    assert ax.get_xlabel() == "sample"
+    axes = plot.draw(plot.prepare(read(tmp_path / "my.toml"))).axes
+    assert [ax.get_xlabel() for ax in axes] == ["stretch", "sample"]
 
 
 def test_a_stress_that_was_set_is_no_saturated_sensor(tmp_path):

@@ -30,6 +30,8 @@ def test_each_verb_takes_what_concerns_it(tmp_path):
     side = tmp_path / "p.yaml"
     assert arguments("fit", PROBLEM, side) == [*common, *held, *told, "--multistart", "1"]
     assert arguments("diagnose", PROBLEM, side) == [*common, "--effect", "slack", *held]
+    sets = PROBLEM | {"candidates": {"effects": ["viscoelasticity-1+slack", "slack"]}}
+    assert arguments("diagnose", sets, side)[3:7] == ["--effect", "viscoelasticity", "--effect", "slack"]
     assert arguments("compare", PROBLEM, side)[:5] == [*common, "--energy", "neo-hookean"]
 
 
@@ -54,6 +56,35 @@ def test_a_fit_from_a_problem_file(tmp_path, monkeypatch, capsys):
     record = json.loads(capsys.readouterr().out)
     assert record["parameters"]["energy.C10"]["value"] == pytest.approx(620, rel=0.02)
     assert (tmp_path / "out/p/fit/report.html").is_file()
+
+
+@pytest.mark.slow
+def test_one_file_serves_four_verbs_on_a_lab_s_table(tmp_path, monkeypatch, capsys):
+    """A semicolon table as a machine writes it; data/lab/README.md says what is in it: 35 % relaxing with 2.5 s."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my.csv").write_bytes((ROOT / "data/lab/tension.csv").read_bytes())
+    assert main(["import", "my.csv"]) == 0
+    told = {
+        "format": "tissuejax-problem-1",
+        "specimen": "my.toml",
+        "model": {"energy": "reduced-polynomial-2", "effects": ["viscoelasticity-1"]},
+        "candidates": {"effects": ["viscoelasticity-1", "slack"]},
+        "out": "out",
+    }
+    (tmp_path / "p.yaml").write_text(yaml.safe_dump(told))
+    capsys.readouterr()
+
+    def answer(*argv: str) -> dict:
+        assert main([*argv, "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    fit = answer("fit", "p.yaml")["parameters"]["effects.viscoelasticity.tau1"]
+    assert abs(fit["value"] - 2.5) < 3.5 * fit["std"]
+    assert [e["name"] for e in answer("diagnose", "p.yaml")["effects"]] == ["viscoelasticity"]
+    best = max(answer("compare", "p.yaml")["rows"], key=lambda row: row["weight"])
+    assert "viscoelasticity-1" in best["name"]
+    assert answer("campaign", "run", "p.yaml", "--engine", "serial")["done"] == 1
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"fit", "diagnose", "compare", "campaign"}
 
 
 BREACHES = {

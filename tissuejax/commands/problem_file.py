@@ -11,6 +11,7 @@ it: the file becomes the arguments that one would have typed, so that every chec
 
 import json
 import os
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -99,6 +100,8 @@ def arguments(verb: str, problem: Mapping[str, object], path: Path) -> list[str]
     made += ["--ogden-form", model["ogden_form"]] if "ogden_form" in model else []
     made += ["--volumetric", model["volumetric"]] if "volumetric" in model and verb != "diagnose" else []
     tried = model.get("effects", ()) if verb == "fit" else candidates.get("effects", ())
+    if verb == "diagnose":  # it puts sets together and chooses the number of terms itself
+        tried = dict.fromkeys(re.sub(r"-\d+$", "", one.strip()) for effect in tried for one in effect.split("+"))
     for effect in tried:
         made += ["--effect", effect]
     for option, key in (("--only", "fit"), ("--holdout", "holdout")):

@@ -44,7 +44,7 @@ def _ways(curve: Curve) -> tuple[bool, ...]:
     """Over what a series is drawn: stretch (False), time (True), or both where one does not stand for the other."""
     if curve.drive is None:
         return (True,)
-    return (False,) if curve.monotone and not curve.held_still or not curve.timed else (False, True)
+    return (False, True) if curve.held_still or (curve.timed and not curve.monotone) else (False,)
 
 
 def _nothing(curve: Curve, recording: Recording) -> bool:
