@@ -6,7 +6,7 @@ scheduler's with it); so on free cores the rate is the smaller of (workers / CPU
 a case).
 
 tissuejax study fits/throughput          (CASES=1000 in the environment for a first look;
-                                          RUNS="processes-1 dask-2": only these, the others' results stay)
+                                          RUNS="processes-1-1000 dask-2-1000": only these, the others' results stay)
 """
 
 import json
@@ -28,7 +28,13 @@ from tissuejax.storage import write_figure, write_json, write_text
 
 CASES = int(os.environ.get("CASES", "10000"))
 PART = min(1000, CASES)  # cases of every run but the largest
-RUNS = (("processes", 1, PART), ("processes", 2, PART), ("dask", 2, PART), ("processes", 4, CASES))
+RUNS = (
+    ("processes", 1, PART),
+    ("processes", 2, PART),
+    ("dask", 2, PART),
+    ("processes", 4, PART),
+    ("processes", 4, CASES),
+)
 STRETCH = np.linspace(1.0, 1.3, 40)
 NOISE = 10.0  # Pa
 ASKED = os.environ.get("RUNS", "").split()
@@ -115,14 +121,14 @@ def main(folder: Path) -> str:
     """Run, time, count; result.json and a figure."""
     work, kept = folder.resolve().parents[1] / "out" / "throughput", folder / "result.json"
     before = json.loads(kept.read_text())["runs"] if ASKED and kept.is_file() else []
-    found = {f"{r['engine']}-{r['workers']}": r for r in before}
+    found = {f"{r['engine']}-{r['workers']}-{r['cases']}": r for r in before}
     for engine, workers, n in RUNS:
-        if not ASKED or f"{engine}-{workers}" in ASKED:
-            found[f"{engine}-{workers}"] = timed(work, engine, workers, n)
+        if not ASKED or f"{engine}-{workers}-{n}" in ASKED:
+            found[f"{engine}-{workers}-{n}"] = timed(work, engine, workers, n)
             write_json(kept, {"cpus": os.cpu_count(), "runs": list(found.values())})
     runs = list(found.values())
     write_figure(folder / "figures" / "throughput.png", drawn(runs), dpi=110)
-    last = runs[-1]
+    last = max(runs, key=lambda r: r["cases"])
     return f"{last['cases']} fits, {last['workers']} workers: {last['per_second']:.1f} a second"
 
 
@@ -133,7 +139,7 @@ def drawn(runs: list[dict]) -> Figure:
     most = np.geomspace(1, 1000, 200)
     one = 1e3 / max(runs, key=lambda r: r["cases"])["workers_cpu_ms_a_case"]  # of a core to itself
     for engine, colour in COLOURS.items():
-        of = [r for r in runs if r["engine"] == engine]
+        of = [r for r in runs if r["engine"] == engine and r["cases"] == PART]
         ceiling = 1e3 / min(r["client_ms_a_case"] for r in of)
         ax.plot([r["workers"] for r in of], [r["per_second_started"] for r in of], "o-" if len(of) > 1 else "s",
                 color=colour, label=f"{engine}, measured here")  # fmt: skip
