@@ -1,14 +1,17 @@
 """A rig that gives way and tissue that relaxes, in a cut: by the balance of energies and in a simulated slice."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from tests.cutting.records import TRUTH, VALUES, model, record, sample, strokes
+from tests.cutting.slabs import cut
 from tissuejax.effects.catalogue import effect
 from tissuejax.experiments.cutting_layers import ages, layer, relaxed
 from tissuejax.experiments.cutting_record import path_of
 from tissuejax.experiments.cutting_run import CuttingSettings
 from tissuejax.experiments.predictor import predictor
+from tissuejax.tled.simulate import run
 
 COMPLIANCE = "effects.machine-compliance.compliance"
 KNOWN = {k: v for k, v in TRUTH.items() if "friction" not in k}
@@ -87,6 +90,29 @@ def test_a_simulated_blade_stands_behind_and_its_work_is_its_own(slice_):
     top = stiff.max()
     assert np.abs(mean(soft[late]) - mean(expected[late])).max() < 0.03 * top
     assert np.abs(mean(soft[late]) - mean(stiff[late])).max() > 0.02 * top
+
+
+@pytest.mark.parametrize("compliance", [0.02, 0.04])
+def test_a_soft_rig_leaves_no_work_unaccounted(slice_, compliance):
+    """20 mm/N: on a slice of a tenth of the depth the blade's contact is 40 times as stiff as the rig."""
+    p, _ = slice_
+    assert float(p.run(KNOWN | {COMPLIANCE: compliance})["r"].imbalance) < 0.005
+
+
+@pytest.mark.parametrize("friction", [None, 0.1])
+def test_what_a_rig_puts_in_and_the_blade_does_not_give_is_in_its_spring(friction):
+    """Work at the driven end less work of the tip is C F^2 / 2, and the tip stands C F behind."""
+    C, frames = 0.4, 480
+    scene = cut(h=1e-3, travel=0.012, frames=frames, strength=3000.0, friction=friction)
+    out = run(scene.put({"probe.compliance": C * jnp.array([1.0, 0.0, 0.0])}))
+    felt = float(-out.state.felt[0, 0])
+    driven = 0.012 / frames * float(-np.asarray(out.force)[:, 0].sum())
+    spring = 0.5 * C * felt**2
+    assert C * felt > 5e-4  # half a millimetre behind
+    assert driven - float(out.work[-1]) == pytest.approx(spring, rel=0.02)
+    work = np.asarray(out.balance.work)
+    assert np.abs(np.asarray(out.balance.error))[work > 0.05 * work[-1]].max() < 0.005
+    assert felt == pytest.approx(float(-out.force[-1, 0]), rel=0.05)
 
 
 def test_relaxing_tissue_asks_less_of_a_simulated_blade(slice_):

@@ -181,16 +181,20 @@ def steps(bare: Scene, step: float | None, shape: Shape | None = None, position=
     return max(1, math.ceil(float(bare.clock.interval / bare.clock.compression) / step - 1e-9))
 
 
-def probe(bare: Scene, shape: Shape, time, position, facets, penalty=None, softness=None) -> Probe:
-    """The probe over its contact patch, with penalty, softness and the static mass of the patch chosen."""
+def probe(bare: Scene, shape: Shape, time, position, facets, penalty=None, softness=None, rule: int = 0) -> Probe:
+    """The probe over its contact patch, with penalty, softness and the static mass of the patch chosen.
+
+    Args:
+        rule: contact points of a quadrilateral (`contact.quadrature`).
+    """
     time, position = np.asarray(time, float), np.asarray(position, float)
     points = np.asarray(bare.body.points)
     if penalty is None:
         penalty = automatic_penalty(bare, shape, facets, position)
     if softness is None:
         softness = ONSET * _shear_modulus(bare) / penalty
-    area = _areas(points, facets)
-    weights, _ = quadrature(facets.shape[1])
+    area = _areas(points, facets, rule)
+    weights, _ = quadrature(facets.shape[1], rule)
     nodal = np.zeros(len(points))
     np.add.at(nodal, facets.T, np.einsum("qv,qp->vp", weights, area))
     mass = penalty * nodal * float(bare.clock.step) ** 2 / 4
@@ -298,14 +302,14 @@ def _patch(nodes, points, fixed, shape, position):
     return nodes[keep]
 
 
-def _areas(points, facets):
+def _areas(points, facets, count=0):
     """Reference area of each contact point, (q, P)."""
-    shape, weight = quadrature(facets.shape[1])
+    _, weight = quadrature(facets.shape[1], count)
     x = points[facets]
     if facets.shape[1] == 3:
         return weight[:, None] * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
     place = np.polynomial.legendre.leggauss(3)[0]
-    a, b = (g.ravel() for g in np.meshgrid(place, place))
+    a, b = (g.ravel() for g in np.meshgrid(place, [0.0] if count == 3 else place))
     da = np.stack([-(1 - b), 1 - b, 1 + b, -(1 + b)], -1) / 4
     db = np.stack([-(1 - a), -(1 + a), 1 + a, 1 - a], -1) / 4
     normal = np.cross(np.einsum("qv,pvi->qpi", da, x), np.einsum("qv,pvi->qpi", db, x))
@@ -314,7 +318,7 @@ def _areas(points, facets):
 
 def _refuse_inside(made: Probe, points, start):
     position = np.array([np.interp(start, made.time, made.position[:, i]) for i in range(3)])
-    weights, _ = quadrature(made.patch.shape[1])
+    weights, _ = quadrature(made.patch.shape[1], len(made.area))
     x = np.einsum("qv,pvi->qpi", weights, points[np.asarray(made.patch)])
     deep = -_distance(made.shape, x - position).min()
     reach = float(made.shape.reach())

@@ -53,28 +53,36 @@ class Seam(NamedTuple):
 
 
 class Held(NamedTuple):
-    """What the faces do in one step: forces (3, N), memory, and energy lost in the step, J."""
+    """What the faces do in one step: forces on the corners of their plus sides (3, v, P), memory, and the energy that
+    each point lost in the step, J (q, P)."""
 
-    nodal: Float[Array, "3 N"]
+    at: Float[Array, "3 v P"]
     memory: Memory
-    lost: Float[Array, ""]
+    lost: Float[Array, "q P"]
 
 
-def quadrature(corners: int) -> tuple[np.ndarray, np.ndarray]:
-    """Shape functions (q, corners), weights (q,): 2 x 2 Gauss points over [-1, 1]^2; three inner ones (sum 1/2)."""
+def quadrature(corners: int, points: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Shape functions (q, corners), weights (q,): 2 x 2 Gauss points over [-1, 1]^2, or with `points` 2 those on the
+    middle line from edge 3-0 to edge 1-2 (enough in a plane slice); three inner ones of a triangle (sum 1/2)."""
     if corners == 4:
-        g = 1 / np.sqrt(3)
-        a, b = np.array([-g, g, g, -g]), np.array([-g, -g, g, g])
-        return np.stack([(1 - a) * (1 - b), (1 + a) * (1 - b), (1 + a) * (1 + b), (1 - a) * (1 + b)], -1) / 4, np.ones(
-            4
-        )
+        a, b = local(points)
+        shape = np.stack([(1 - a) * (1 - b), (1 + a) * (1 - b), (1 + a) * (1 + b), (1 - a) * (1 + b)], -1) / 4
+        return shape, np.full(len(a), 4.0 / len(a))
     return np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6, np.full(3, 1 / 6)
+
+
+def local(points: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places of a quadrilateral's points in [-1, 1]^2, see `quadrature`."""
+    g = 1 / np.sqrt(3)
+    if points == 2:
+        return np.array([-g, g]), np.zeros(2)
+    return np.array([-g, g, g, -g]), np.array([-g, -g, g, g])
 
 
 def seam(faces: Faces, points: Float[Array, "N 3"]) -> Seam:
     """Reference places of the faces."""
     x = points.T[:, faces.minus.T]
-    shape = jnp.asarray(quadrature(faces.minus.shape[1])[0], x.dtype)
+    shape = jnp.asarray(quadrature(faces.minus.shape[1], len(faces.area))[0], x.dtype)
     return Seam(x, jnp.einsum("qv,ivp,i->qp", shape, x, faces.along.astype(x.dtype)))
 
 
@@ -84,33 +92,29 @@ def unopened(faces: Faces) -> Memory:
     return memory if faces.notch is None else memory._replace(secant=memory.secant * (1 - faces.notch))
 
 
-def gaps(faces: Faces, seam: Seam, u: Float[Array, "3 N"]) -> tuple[Vector, Vector]:
-    """Opening of the points (three arrays (q, P), m) and the normals midway (three arrays (P,))."""
-    low = u.at[:, faces.minus.T].get(mode="promise_in_bounds")
-    high = u.at[:, faces.plus.T].get(mode="promise_in_bounds")
-    shape = jnp.asarray(quadrature(faces.minus.shape[1])[0], u.dtype)[:, :, None]
-    jump, middle = barrier((high - low, seam.x + 0.5 * (high + low)))
-    gap = tuple(sum(shape[:, a] * d[a] for a in range(shape.shape[1])) for d in jump)
+def gaps(seam: Seam, low: Float[Array, "3 v P"], high: Float[Array, "3 v P"]) -> tuple[Vector, Vector]:
+    """Opening of the points (three arrays (q, P), m) and the normals midway (three arrays (P,)), from the displacements
+    of the corners of the minus and the plus sides."""
+    shape = jnp.asarray(quadrature(low.shape[1], len(seam.ahead))[0], low.dtype)[:, :, None]
+    jump, middle = high - low, barrier(seam.x + 0.5 * (high + low))
+    gap = barrier(sum(shape[:, a] * jump[:, a][:, None] for a in range(shape.shape[1])))
     if shape.shape[1] == 4:
         one, two = middle[:, 2] - middle[:, 0], middle[:, 3] - middle[:, 1]
     else:
         one, two = middle[:, 1] - middle[:, 0], middle[:, 2] - middle[:, 0]
-    normal = jnp.stack(
-        [one[1] * two[2] - one[2] * two[1], one[2] * two[0] - one[0] * two[2], one[0] * two[1] - one[1] * two[0]]
-    )
-    return tuple(barrier(gap)), tuple(barrier(normal / jnp.sqrt(jnp.sum(normal**2, 0))))
+    x, y, z = (one[i - 2] * two[i - 1] - one[i - 1] * two[i - 2] for i in range(3))
+    size = jax.lax.rsqrt(x * x + y * y + z * z)
+    return tuple(gap), barrier((x * size, y * size, z * size))
 
 
-def forces(faces: Faces, seam: Seam, u: Float[Array, "3 N"], memory: Memory) -> Held:
-    """Forces of the faces on the tissue at displacements u."""
-    gap, normal = gaps(faces, seam, u)
+def by_face(faces: Faces, seam: Seam, high: Float[Array, "3 v P"], low: Float[Array, "3 v P"], memory: Memory) -> Held:
+    """What the faces do at displacements `high` and `low` of the corners of their plus and minus sides."""
+    gap, normal = gaps(seam, low, high)
     acting = pull(faces.law, faces.values, faces.stiffness, faces.contact, gap, normal, memory)
     f = barrier(jnp.stack(acting.traction) * faces.area)
-    shape = jnp.asarray(quadrature(faces.minus.shape[1])[0], f.dtype)[:, :, None]
-    at = barrier(sum(shape[q] * f[:, q][:, None] for q in range(shape.shape[0])))
-    nodal = jnp.zeros_like(u).at[:, faces.plus.T].add(at, mode="promise_in_bounds")
-    nodal = nodal.at[:, faces.minus.T].add(-at, mode="promise_in_bounds")
-    return Held(nodal, acting.memory, jnp.sum(acting.lost * faces.area))
+    shape = jnp.asarray(quadrature(low.shape[1], len(seam.ahead))[0], f.dtype)[:, :, None]
+    at = sum(shape[q] * f[:, q][:, None] for q in range(shape.shape[0]))
+    return Held(at, acting.memory, acting.lost * faces.area)
 
 
 class Cracked(NamedTuple):
@@ -123,7 +127,8 @@ class Cracked(NamedTuple):
 
 def cracked(faces: Faces, seam: Seam, u: Float[Array, "3 N"], memory: Memory) -> Cracked:
     """How far the crack has come. Parted: opened as far as the law's end, or notched before; -inf where nothing is."""
-    gap, normal = gaps(faces, seam, u)
+    low, high = (u.at[:, nodes.T].get(mode="promise_in_bounds") for nodes in (faces.minus, faces.plus))
+    gap, normal = gaps(seam, low, high)
     energy = jnp.sum(faces.area * stored(memory.secant, faces.contact, gap, normal))
     parted = memory.reached >= faces.law.end(faces.values, faces.stiffness)
     ahead = parted if faces.notch is None else parted | (faces.notch > 0)

@@ -22,7 +22,7 @@ from tissuejax.mesh.facets import area_vectors, boundary
 from tissuejax.mesh.split import Split
 from tissuejax.tled import build
 from tissuejax.tled.blade import Wedge
-from tissuejax.tled.faces import Faces, quadrature
+from tissuejax.tled.faces import Faces, local, quadrature
 from tissuejax.tled.scene import Scene
 from tissuejax.tled.shapes import Shape
 from tissuejax.tled.stable import wave_modulus
@@ -31,18 +31,18 @@ STIFF, LAW = 11.0, 4.0
 LIPS = 1.5  # surface beside the cut that may touch the blade, in its thickness
 UPRIGHT = 0.7  # a lip's normal goes along the cut (x, as the blade's) by at least this share
 ARC, SHARP = 4.0, 0.2  # radius of a shoulder in facets, and at least in thicknesses
+ALONG, BESIDE = 2, 3  # points of a face and of a blade's facet in a plane slice, in which nothing changes across it
 PRESSED = 50.0  # penalty in M / W
 HOURGLASS = 1.0  # in shear moduli: at 0.3 the corner where a blade enters soft tissue folds over in hourglass modes
 
 
-def areas(points: Float[np.ndarray, "N 3"], nodes) -> Float[np.ndarray, "q P"]:
-    """Reference area of each integration point of the faces, m^2."""
+def areas(points: Float[np.ndarray, "N 3"], nodes, rule: int = 0) -> Float[np.ndarray, "q P"]:
+    """Reference area of each integration point of the faces, m^2; `rule`: see `faces.quadrature`."""
     x = np.asarray(points)[nodes]
-    shape, weight = quadrature(nodes.shape[1])
+    shape, weight = quadrature(nodes.shape[1], rule)
     if nodes.shape[1] == 3:
         return weight[:, None] * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
-    g = 1 / math.sqrt(3)
-    a, b = np.array([-g, g, g, -g]), np.array([-g, -g, g, g])
+    a, b = local(rule)
     da = np.stack([-(1 - b), 1 - b, 1 + b, -(1 + b)], -1) / 4
     db = np.stack([-(1 - a), -(1 + a), 1 + a, 1 - a], -1) / 4
     normal = np.cross(np.einsum("qv,pvi->qpi", da, x), np.einsum("qv,pvi->qpi", db, x))
@@ -94,19 +94,43 @@ def joined(
             f"faces of stiffness {K:.3g} Pa/m reach the strength {strength:.4g} Pa only at an opening that has used up "
             f"the energy {energy:.4g} J/m^2; above {strength**2 / energy:.3g} Pa/m is needed: leave it to the program"
         )
-    area = areas(split.geometry.points, split.minus)
+    minus, plus, rule = split.minus, split.plus, 0
+    if sliced(scene):
+        rule, turns = ALONG, upright(split.geometry.points, minus)
+        minus, plus = turned(minus, turns), turned(plus, turns)
+    area = areas(split.geometry.points, minus, rule)
     initial = K if not math.isfinite(energy) else float(jnp.max(law.initial(_arrays(values), jnp.asarray(K))))
     nodal = np.zeros(len(split.geometry.points))
-    shape, _ = quadrature(split.minus.shape[1])
-    for side in (split.minus, split.plus):
+    shape, _ = quadrature(minus.shape[1], rule)
+    for side in (minus, plus):
         np.add.at(nodal, side.T, np.einsum("qv,qp->vp", shape, area))
     mass = 2 * max(K, initial) * nodal * float(scene.clock.step) ** 2 / 4
     made = Faces(
-        law, _arrays(values), jnp.asarray(split.minus, jnp.int32), jnp.asarray(split.plus, jnp.int32),
+        law, _arrays(values), jnp.asarray(minus, jnp.int32), jnp.asarray(plus, jnp.int32),
         jnp.asarray(area), jnp.asarray(K), jnp.asarray(K), jnp.asarray(mass), jnp.asarray(along, float),
         None if notch is None else jnp.asarray(notch, float),
     )  # fmt: skip
     return scene.put({"faces": made})
+
+
+def sliced(scene: Scene) -> bool:
+    """Whether the body is a plane slice: one layer of hexes that can not move along z."""
+    points, held = np.asarray(scene.body.points), np.zeros(len(scene.body.points), bool)
+    held[np.asarray(scene.body.fixed)] = np.asarray(scene.body.held)[:, 2] > 0
+    z = points[:, 2]
+    flat = np.isclose(z, z.min()) | np.isclose(z, z.max())
+    return scene.body.cells.shape[1] == 8 and bool(held.all() and flat.all())
+
+
+def upright(points: Float[np.ndarray, "N 3"], nodes) -> np.ndarray:
+    """Facets (P,) of a plane slice whose first edge leads across it."""
+    z = np.asarray(points)[nodes][:, :, 2]
+    return np.abs(z[:, 1] - z[:, 0]) > np.abs(z[:, 2] - z[:, 1])
+
+
+def turned(nodes, turns) -> np.ndarray:
+    """Facets whose nodes are numbered from the second on where `turns` says so."""
+    return np.where(turns[:, None], np.roll(nodes, -1, 1), nodes)
 
 
 def pairs(split: Split):
@@ -139,13 +163,16 @@ def armed(
             penalty = max(penalty, 2 * float(scene.faces.stiffness), 50 * strongest / float(blade.thickness))
     lip, beside = lips(split, LIPS * float(blade.thickness))
     nodes = np.concatenate([split.minus, split.plus[:, ::-1], lip])
+    rule = 0
+    if sliced(scene):
+        rule, nodes = BESIDE, turned(nodes, upright(split.geometry.points, nodes))
     side = np.concatenate([np.repeat([-1.0, 1.0], len(split.minus)), beside])
     spare = -len(nodes) % build.PATCH
     sided = Wedge(**{**vars(blade), "side": jnp.asarray(np.concatenate([side, np.ones(spare)]))})
     softness = build.ONSET * modulus * float(blade.thickness) / (2 * width) / penalty / 10
     tip = np.asarray(tip, float)
     _refuse_inside(blade, split, tip, np.interp(float(scene.clock.start), time, np.arange(len(time))))
-    made = build.probe(scene, _Outside(), time, tip, nodes, penalty, softness)
+    made = build.probe(scene, _Outside(), time, tip, nodes, penalty, softness, rule)
     scene = scene.put({"probe": made}).put({"probe.shape": sided})
     return scene if friction is None else scene.put({"probe.friction": jnp.asarray(float(friction))})
 

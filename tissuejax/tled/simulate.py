@@ -26,9 +26,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from tissuejax.tled import contact, internal, verdict
-from tissuejax.tled.ledger import Balance, Spent, balance, look
+from tissuejax.tled.ledger import Balance, balance, look
 from tissuejax.tled.scene import Scene
-from tissuejax.tled.step import Drive, Felt, Machine, State, advance, machine, start
+from tissuejax.tled.step import Drive, Felt, Machine, State, advance, machine, start, summed
 
 COMPILER_OPTIONS = {
     "xla_disable_hlo_passes": "cse_barrier_expander",  # keeps the stages apart, see `internal.py`
@@ -139,14 +139,15 @@ def proceed(m: Machine, state: State) -> Outcome:
             state, new = advance(m, state, drive)
             return (state, jax.tree.map(jnp.add, felt, new)), None
 
-        zero = jnp.zeros(3, state.u.dtype)
-        none = Felt(zero, zero, zero, zero[0], None if scene.faces is None else Spent(*[zero[0]] * 5))
+        first = jax.tree.map(lambda x: x[0], drive)
+        none = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), jax.eval_shape(advance, m, state, first)[1])
         (state, total), _ = jax.lax.scan(one, (state, none), drive, length=clock.steps)
+        total = summed(total)
         mean = Felt(*(x / clock.steps for x in total[:3]), total.work, total.spent)
         looked = None
         if scene.faces is not None:
             centre = None if drive.centre is None else drive.centre[-1] + 0.5 * drive.stride[-1]
-            given = centre if state.felt is None else centre + scene.probe.compliance * state.felt
+            given = centre if state.felt is None else centre + scene.probe.compliance * jnp.mean(state.felt, 0)
             looked = look(m, state, given)
         return state, (mean, _markers(scene, state.u), _pace(m, state, drive), looked)
 
@@ -240,7 +241,7 @@ def _depth(frozen: tuple[Machine, State], drive: Drive) -> Float[Array, ""]:
     if drive.centre is None:
         return jnp.asarray(-jnp.inf, state.u.dtype)
     centre = jax.lax.stop_gradient(drive.centre[-1])
-    centre = centre if state.felt is None else centre + m.scene.probe.compliance * state.felt
+    centre = centre if state.felt is None else centre + m.scene.probe.compliance * state.felt[0]
     return contact.depth(m.scene.probe, m.patch, state.u, centre)
 
 

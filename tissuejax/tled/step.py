@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
-from tissuejax.tled import capsule, contact, faces, internal, loads, stable, support
+from tissuejax.tled import capsule, contact, faces, internal, loads, stable, support, surface
 from tissuejax.tled.glide import Glide, glide, spurred
 from tissuejax.tled.internal import barrier
 from tissuejax.tled.ledger import Spent
@@ -29,17 +29,19 @@ class Machine(NamedTuple):
     weight: Float[Array, "3 N"] | None
     glide: Glide | None
     seam: faces.Seam | None = None
+    corners: Int[Array, "3 v P"] | None = None
 
 
 class State(NamedTuple):
-    """What one step hands to the next: u (3, N) m, v (3, N) m/s half a step behind, memories, the force felt."""
+    """What one step hands to the next: u (3, N) m, v (3, N) m/s half a step behind, memories, the force that a
+    compliant machine has given way to, N, now and a step before."""
 
     u: Float[Array, "3 N"]
     v: Float[Array, "3 N"]
     history: internal.History
     grip: contact.Grip | None
     slip: support.Slip
-    felt: Float[Array, " 3"] | None
+    felt: Float[Array, "2 3"] | None
     opening: faces.Memory | None = None
 
 
@@ -55,17 +57,24 @@ class Drive(NamedTuple):
 
 
 class Felt(NamedTuple):
-    """What a step reports: force and torque on the probe, force on the support, work done by the probe, and with
-    cohesive faces what else was spent."""
+    """What a step reports: force and torque on the probe (by facet: sum over the last axis), force on the support, work
+    done by the probe (by facet), and with cohesive faces what else was spent (by point or node: `summed`)."""
 
-    force: Float[Array, " 3"]
-    torque: Float[Array, " 3"]
+    force: Float[Array, "3 n"]
+    torque: Float[Array, "3 n"]
     reaction: Float[Array, " 3"]
-    work: Float[Array, ""]
+    work: Float[Array, " n"]
     spent: Spent | None = None
 
 
-FEEL = 0.05  # share of the new force per step that a compliant machine answers to: keeps the loop stable
+def summed(felt: Felt) -> Felt:
+    """Over facets, points and nodes, after a frame: a sum in every step costs more than what it sums."""
+    force, torque = (jnp.sum(x, 1) for x in felt[:2])
+    spent = None if felt.spent is None else Spent(*(jnp.sum(x) for x in felt.spent))
+    return Felt(force, torque, felt.reaction, jnp.sum(felt.work), spent)
+
+
+FEEL = 0.5  # share of a Newton step towards equilibrium that a compliant machine takes in each of the run's steps
 
 
 def machine(scene: Scene) -> Machine:
@@ -81,7 +90,9 @@ def machine(scene: Scene) -> Machine:
     patch = None if probe is None else contact.patch(scene)
     hold = support.hold(scene, stiffness)
     slides = None if scene.support.compliance is None else glide(scene, mass, hold.area)
-    return Machine(scene, mesh, hold, patch, skin, mass, weight, slides, seam)
+    touched = probe is not None or scene.faces is not None
+    corners = surface.corners(patch, scene.faces, len(scene.body.points)) if touched else None
+    return Machine(scene, mesh, hold, patch, skin, mass, weight, slides, seam, corners)
 
 
 def start(m: Machine) -> State:
@@ -104,7 +115,7 @@ def start(m: Machine) -> State:
         v = jnp.where(m.hold.held, 0.0, -0.5 * scene.clock.step * pull / m.mass)
     grip = None if scene.probe is None else contact.untouched(scene.probe)
     compliant = scene.probe is not None and scene.probe.compliance is not None
-    felt = jnp.zeros(3, u.dtype) if compliant else None
+    felt = jnp.zeros((2, 3), u.dtype) if compliant else None
     opening = None if scene.faces is None else faces.unopened(scene.faces)
     return State(u, v, internal.rest(scene, m.mesh), grip, support.bonded(scene), felt, opening)
 
@@ -130,23 +141,24 @@ def advance(m: Machine, state: State, drive: Drive) -> tuple[State, Felt]:
     outer = jnp.zeros_like(u) if m.weight is None else m.weight + 0.0
     if scene.loads is not None:
         outer = outer + loads.forces(scene.loads, scene.body.points, u, drive.load)
-    zero = jnp.zeros(3, u.dtype)
-    force = torque = zero
-    work, grip, felt, opening = zero[0], state.grip, state.felt, state.opening
-    rubbed = lost = None
+    none = jnp.zeros((3, 1), u.dtype)
+    force = torque = none
+    work, grip, felt, opening = none[0], state.grip, state.felt, state.opening
+    acting = None
+    if m.corners is not None:
+        centre = drive.centre if felt is None else drive.centre + scene.probe.compliance * felt[0]
+        acting = _surface(m, u, centre, grip, opening)
+        grip, opening = acting.grip, acting.memory
     if scene.probe is not None:
-        centre = drive.centre if felt is None else drive.centre + scene.probe.compliance * felt
-        touch = _touch(scene.probe, m.patch, u, centre, grip)
-        outer, grip, rubbed = outer + touch.nodal, touch.grip, touch.rubbed
-        force, torque, work = touch.force, touch.torque, -jnp.sum(touch.force * drive.stride)
+        force, torque = acting.force, acting.torque
+        work = -jnp.sum(force * drive.stride[:, None], 0)
         if felt is not None:
-            new = felt + FEEL * (force - felt)
-            work = work - jnp.sum(touch.force * scene.probe.compliance * (new - felt))  # the rig springs back meanwhile
-            felt = new
-    if scene.faces is not None:
-        held = jax.checkpoint(faces.forces, prevent_cse=False)(scene.faces, m.seam, u, opening)
-        outer, opening, lost = outer + held.nodal, held.memory, held.lost
+            new = _given_way(m, jnp.sum(force, 1), felt[0], u, centre, state)
+            # the tip moves on its spring too: its way from half a step before to half a step after, as the path's is
+            work = work - jnp.sum(force * (0.5 * scene.probe.compliance * (new - felt[1]))[:, None], 0)
+            felt = jnp.stack([new, felt[0]])
     f = outer - inner
+    f = f if acting is None else surface.added(acting, f)
     half = 0.5 * settings.mass_damping * h
     moving = f if m.glide is None else spurred(scene, m.glide, f, state.slip.elastic, m.hold.area, m.mass)
     driven = (1.0 - half) * v + h * moving / m.mass
@@ -158,22 +170,40 @@ def advance(m: Machine, state: State, drive: Drive) -> tuple[State, Felt]:
     pushed = jnp.where(m.hold.held, (moved - u) / h, pushed)
     moved, pushed = barrier((moved, pushed))
     reaction = jnp.sum(scene.body.held.T * f[:, scene.body.fixed], axis=1)  # force of the tissue on the support
-    spent = None if lost is None else _spent(m, lost, rubbed, inner, f, v, pushed)
+    spent = None if scene.faces is None else _spent(m, acting, inner, f, v, pushed)
     return State(moved, pushed, history, grip, slip, felt, opening), Felt(force, torque, reaction, work, spent)
 
 
-def _spent(m: Machine, lost, rubbed, inner, f, v, pushed) -> Spent:
-    """Losses and works of one step, J, at the mean of the speeds before and after."""
-    scene, zero = m.scene, jnp.zeros_like(lost)
+def _spent(m: Machine, acting: surface.Acting, inner, f, v, pushed) -> Spent:
+    """Losses and works of one step, J, at the mean of the speeds before and after, point by point or node by node."""
+    scene, zero = m.scene, jnp.zeros(1, v.dtype)
     h, mean = scene.clock.step, 0.5 * (v + pushed)
     free = jnp.where(m.hold.held, 0.0, mean)
-    damping = scene.settings.mass_damping * h * contact.total(m.mass * free * free)
+    damping = scene.settings.mass_damping * h * m.mass * jnp.sum(free * free, 0)
     shove = zero
     if scene.support.displacement is not None:
-        carried = jnp.where(m.hold.held, mean * (m.mass * (pushed - v) - h * f), 0.0)
-        shove = contact.total(carried)
-    return Spent(lost, zero if rubbed is None else rubbed, damping, h * contact.total(inner * mean), shove)
+        shove = jnp.sum(jnp.where(m.hold.held, mean * (m.mass * (pushed - v) - h * f), 0.0), 0)
+    rubbed = zero if acting.rubbed is None else acting.rubbed
+    return Spent(acting.lost, rubbed, damping, h * jnp.sum(inner * mean, 0), shove)
 
 
-def _touch(probe, patch, u, centre, grip):
-    return jax.checkpoint(contact.forces, prevent_cse=False)(probe, patch, u, centre, grip)
+def _given_way(m: Machine, force, felt, u, centre, state) -> Float[Array, " 3"]:
+    """The force that the machine gives way to in the next step, N.
+
+    In equilibrium it is the contact's own: felt = F(centre + compliance * felt). A part of Newton's step towards that
+    is taken, with the contact's stiffness as it is. A fixed part of the difference instead leaves the loop unstable
+    where compliance times stiffness is large: the blade chatters, and the balance of energies is open by more than
+    the work.
+    """
+    compliance = jnp.broadcast_to(m.scene.probe.compliance, 3)
+    total = lambda at: jnp.sum(_surface(m, u, at, state.grip, state.opening).force, 1)  # noqa: E731
+    stiffness = -jax.jacfwd(total)(centre)
+    step = jnp.linalg.solve(jnp.eye(3, dtype=u.dtype) + stiffness * compliance, force - felt)
+    return felt + FEEL * step
+
+
+def _surface(m, u, centre, grip, opening) -> surface.Acting:
+    scene = m.scene
+
+    again = jax.checkpoint(surface.forces, prevent_cse=False)
+    return again(scene.probe, m.patch, scene.faces, m.seam, m.corners, u, centre, grip, opening)
