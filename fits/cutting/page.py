@@ -34,6 +34,12 @@ def _means(at, force) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(at)[20:-19], np.convolve(force, np.ones(40) / 40, "valid")
 
 
+def _differences(part: dict) -> list[tuple[str, dict]]:
+    """Derivatives against central differences: of a cut that is hardly damped, on a finer mesh, damped as in a fit."""
+    named = {"": part, ", elements of 0.5 mm": part.get("finer", {}), ", damped as a fit does": part.get("calm", {})}
+    return [(f"derivatives, step by step{more}", some) for more, some in named.items() if "differences" in some]
+
+
 def write(folder: Path, found: dict) -> Path:
     """report.html and the figures from result.json."""
     tables = []
@@ -44,10 +50,10 @@ def write(folder: Path, found: dict) -> Path:
         rows = [[f"{r[k]:.4g}" if isinstance(r.get(k), float) else r.get(k, "") for k in plain] for r in runs]
         if plain:
             tables.append({"title": name, "columns": [k.replace("_", " ") for k in plain], "rows": rows})
-        if "differences" in part:
-            rows = [[k, f"{v:.2g}", f"{part['differences_of_means'][k]:.2g}"] for k, v in part["differences"].items()]
+        for title, some in _differences(part):
+            rows = [[k, f"{v:.2g}", f"{some['differences_of_means'][k]:.2g}"] for k, v in some["differences"].items()]
             columns = ["parameter and relative step", "derivative against central difference", "of means over 1 mm"]
-            tables.append({"title": "derivatives, step by step", "columns": columns, "rows": rows})
+            tables.append({"title": title, "columns": columns, "rows": rows})
     shown = []
     if "recovery" in found:
         runs = found["recovery"]["runs"]

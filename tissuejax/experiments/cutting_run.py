@@ -31,7 +31,7 @@ from tissuejax.tled.simulate import simulate
 
 SPEED = 0.05  # m/s
 FEW = 8
-CALM_CUT = 0.25  # friction excites that mode, the more the longer the blade is in contact; at 0.04 it grows
+CALM_CUT = 0.5  # friction excites that mode, the more the longer the blade is in contact: at 0.25 it still grows
 
 
 @dataclass(frozen=True)
