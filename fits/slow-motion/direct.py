@@ -95,16 +95,15 @@ def inertia(direct: Direct, finer: Direct) -> dict:
 
 def paces(matter, radius: float) -> dict:
     """Everything measured."""
-    with native.preferred() as in_c:
-        found = {"element_loop": "C" if in_c else "XLA", "load": list(os.getloadavg())}
-        cube, free = body((0.1, 0.1, 0.1), (10, 10, 10)), body((0.18, 0.115, 0.04), (14, 10, 5))
-        lobe = body((0.18, 0.115, 0.04), (14, 10, 5), radius)
-        found["bodies"] = _lobes(cube, free, lobe)
-        found["contact_share"] = {}
-        for direct in (Direct(lobe, PRESS), Direct(direct_scene(matter, Grid(FINE, radius), np.zeros(2)), 7e-3)):
-            words = f"{len(direct.scene.body.cells)} elements, {direct.scene.probe.area.shape[-1]} facets"
-            found["contact_share"][words] = _share(direct)
-        found["meshes"] = {"x".join(map(str, c)): _mesh(matter, Grid(c, radius)) for c in MESHES}
+    found = {"element_loop": "C" if native.wanted() else "XLA", "load": list(os.getloadavg())}
+    cube, free = body((0.1, 0.1, 0.1), (10, 10, 10)), body((0.18, 0.115, 0.04), (14, 10, 5))
+    lobe = body((0.18, 0.115, 0.04), (14, 10, 5), radius)
+    found["bodies"] = _lobes(cube, free, lobe)
+    found["contact_share"] = {}
+    for direct in (Direct(lobe, PRESS), Direct(direct_scene(matter, Grid(FINE, radius), np.zeros(2)), 7e-3)):
+        words = f"{len(direct.scene.body.cells)} elements, {direct.scene.probe.area.shape[-1]} facets"
+        found["contact_share"][words] = _share(direct)
+    found["meshes"] = {"x".join(map(str, c)): _mesh(matter, Grid(c, radius)) for c in MESHES}
     return found | {"lobe, XLA": _by_xla(lobe)}
 
 

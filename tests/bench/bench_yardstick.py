@@ -1,8 +1,8 @@
 """Our step over the hand-written one of `yardstick.c`, in one run and in turns. Run as a script, where a C compiler is.
 
-    OMP_NUM_THREADS=1 XLA_FLAGS=--xla_cpu_multi_thread_eigen=false [TISSUEJAX_NATIVE=on] python ... [HEXES A SIDE ...]
+    OMP_NUM_THREADS=1 XLA_FLAGS=--xla_cpu_multi_thread_eigen=false [TISSUEJAX_NATIVE=off] python ... [HEXES A SIDE ...]
 
-Writes `results/yardstick.json`, or with the element loop in C `results/yardstick_c.json`: bandwidth, multiply-adds, ns
+Writes `results/yardstick_c.json`, or left to XLA `results/yardstick.json`: bandwidth, multiply-adds, ns
 of CPU time an element and step, and the ratio.
 """
 

@@ -190,10 +190,12 @@ def test_a_number_for_each_lane_given_as_one_for_all_is_refused():
         loop.trace(lane, 4, slots, ["lane"], jnp.float64)
 
 
-@pytest.mark.parametrize(("chosen", "wanted"), [("", False), ("off", False), ("on", True)])
-def test_it_is_used_where_it_was_asked_for(monkeypatch, chosen, wanted):
+@pytest.mark.parametrize(("chosen", "wanted"), [(None, True), ("off", False), ("on", True)])
+def test_it_is_used_unless_it_is_switched_off(monkeypatch, chosen, wanted):
     monkeypatch.undo()
-    monkeypatch.setenv(library.ENVIRONMENT, chosen)
+    monkeypatch.delenv(library.ENVIRONMENT, raising=False)
+    if chosen is not None:
+        monkeypatch.setenv(library.ENVIRONMENT, chosen)
     assert native.wanted() is wanted
 
 

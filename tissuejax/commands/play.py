@@ -76,8 +76,7 @@ A loop without permission for real-time priority runs and says so. A direct scen
         if given.seconds is not None and not 0 <= given.seconds < np.inf:
             raise InputError(f"--seconds {given.seconds:g}: wanted is 0 or more")
         if given.direct:
-            with native.preferred() as in_c:
-                return _direct(given, in_c)
+            return _direct(given, native.wanted())
         if given.source is None:
             raise InputError("which FILE? make one with `tissuejax precompute`, or use --direct")
         if _is_run(given.source):

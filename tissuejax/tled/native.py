@@ -1,19 +1,18 @@
 """The element loop of a scene, and its contact, as compiled C (`lanes/`), where a C compiler is; elsewhere what XLA
 makes of them stands.
 
-It is off unless TISSUEJAX_NATIVE=on, and on in `play --direct`, where each call counts. XLA copies between its stages,
-and each of some 55 operations a block costs a call: the step takes 3.2 to 3.7 times what a hand-written one does
-(tests/bench/yardstick.c, a Zen 3 core under load). The same traced formula, written out as C, takes 1.5 times as much
-(1,000 hexes, float32), a gradient 2.7 runs and a Jacobian of five parameters 5.9, whose tangents share what does not
-depend on them. Energies are still written once, as energies: the C is made from what JAX traced of the element,
-derivatives included.
+TISSUEJAX_NATIVE=off leaves all to XLA: the same to rounding. XLA copies between its stages, and each of some 55
+operations a block costs a call: the step takes 2.8 to 4.6 times what a hand-written one does (tests/bench/yardstick.c,
+a core with AVX-512). The same traced formula, written out as C, takes 1.6 to 1.9 times as much, and a probing's fit
+(p01) 0.64 of the CPU time with everything compiled anew, 0.52 with programs kept. Energies are still written once, as
+energies: the C is made from what JAX traced of the element, derivatives included; an operation that has no form in C
+leaves its loop to XLA.
 """
 
-import contextlib
 import dataclasses
 import os
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import jax
@@ -34,21 +33,8 @@ FACETS = 16  # that contact takes at once: `build.PATCH`, of which all patches a
 
 
 def wanted() -> bool:
-    """Whether the loop in C was asked for and a compiler is here."""
-    return os.environ.get(ENVIRONMENT, "").lower() == "on" and compiler() is not None
-
-
-@contextlib.contextmanager
-def preferred() -> Iterator[bool]:
-    """Within it the loop in C is taken where a compiler is, unless the environment says otherwise; whether it is."""
-    if os.environ.get(ENVIRONMENT):
-        yield wanted()
-        return
-    os.environ[ENVIRONMENT] = "on"
-    try:
-        yield wanted()
-    finally:
-        del os.environ[ENVIRONMENT]
+    """Whether a compiler is here and the environment does not leave the loop to XLA."""
+    return os.environ.get(ENVIRONMENT, "on").lower() != "off" and compiler() is not None
 
 
 def loop(by_element: Callable, scene: "Scene", mesh: Any, history: Any) -> Callable | None:

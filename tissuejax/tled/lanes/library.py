@@ -1,6 +1,6 @@
 """A C compiler, where there is one: programs compiled once, kept by the hash of their text, and given to XLA by name.
 
-`TISSUEJAX_NATIVE=on` asks for it. Else, and where no compiler is, all is left to XLA: the same results to rounding.
+With `TISSUEJAX_NATIVE=off`, and where no compiler is, all is left to XLA: the same results to rounding.
 """
 
 import ctypes
