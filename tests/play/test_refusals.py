@@ -48,6 +48,7 @@ def refused(capsys, *argv) -> str:
         ([*SLAB, "--site", "12,0", "--reach", "4", "--depth", "5"], "4.0 mm from its rim; places must keep 1.5 probe"),
         ([*SLAB, *SOFTER, "--reach", "3", "--depth", "5"], "softening can't be tabulated: .* --direct"),
         (TISSUE, "which body"),
+        (["out/no-such-fit"], "out/no-such-fit: no such file or folder"),
         (["--slab", "40x40x14", *TISSUE], "give --radius in mm"),
         ([*SLAB, "--site", "12;8"], "wanted is X,Y in mm"),
         ([*SLAB, "--mesh", "7x8x2"], "even numbers of at least 8"),

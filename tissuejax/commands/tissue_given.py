@@ -106,6 +106,8 @@ def _is_fit(source: str) -> bool:
 
 
 def _model(given):
+    if given.source is not None and not Path(given.source).exists():
+        raise InputError(f"{given.source}: no such file or folder: wanted is a fit's, or a recording with the body")
     if given.source is None or not _is_fit(given.source):
         if given.energy is None:
             raise InputError("which model? name a fit's folder, or --energy with --value PATH=VALUE for each parameter")
