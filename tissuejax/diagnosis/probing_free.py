@@ -9,19 +9,23 @@ with slopes s_i = dy/dc_i of everything measured by the probe's place,
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from tissuejax.diagnosis.probing_series import CHANNELS, filled, picked, put
 from tissuejax.effects.effect import Effect
-from tissuejax.experiments.probing_sensors import smooth_path
 from tissuejax.recordings.recording import Channel
 
 if TYPE_CHECKING:
     from tissuejax.diagnosis.probing import ProbingBench
 
+# by axis, an effect that sets the probe aside along it, and how far, m
 ASIDE = {
     "x": ("effects.registration.dx", 3e-4),
     "y": ("effects.registration.dy", 3e-4),
@@ -33,7 +37,8 @@ def sensed(bench: "ProbingBench", path: str) -> bool:
     """Whether a parameter only changes what the sensors report."""
     if not path.startswith("effects."):
         return False
-    return _silent(bench.runs.effects[path.split(".")[1]]) or path == "effects.registration.turn"
+    effect = bench.runs.effects[path.split(".")[1]]
+    return _silent(effect) or path.split(".")[2] in effect.sensed
 
 
 def _silent(effect: Effect) -> bool:
@@ -53,10 +58,6 @@ def _amplitude(bench: "ProbingBench", path: str) -> bool:
     return name in bench.runs.effects[effect].amplitudes
 
 
-def _axes(path: str) -> str:
-    return {"dx": "x", "dy": "y", "depth": "z", "lean_x": "x", "lean_y": "y"}.get(path.split(".")[2], "xyz")
-
-
 def _own(path: str, wanted: tuple[str, ...]) -> tuple[str, ...]:
     """The recordings in which a path acts."""
     return tuple(r for r in wanted if r == path.rsplit(".", 1)[-1]) or wanted
@@ -65,8 +66,8 @@ def _own(path: str, wanted: tuple[str, ...]) -> tuple[str, ...]:
 def displaced(bench: "ProbingBench", at: Mapping[str, float], path: str, wanted: tuple[str, ...]) -> list:
     """The runs that `moving` needs."""
     own = _own(path, wanted)
-    axes = [(a, ASIDE[a]) for a in _axes(path)]
-    return [(at, own, bench.slopes), *((_shifted(at, p, h, own), own, bench.slopes) for _, (p, h) in axes)]
+    asked = [_shifted(at, *ASIDE[axis], own) for axis in _axes(bench, at, path, own)]
+    return [(values, own, bench.slopes) for values in (at, *asked)]
 
 
 def _shifted(at: Mapping[str, float], path: str, h: float, own: tuple[str, ...]) -> dict[str, float]:
@@ -79,66 +80,96 @@ def moving(bench: "ProbingBench", at: Mapping[str, float], path: str, wanted: tu
     own = _own(path, wanted)
     origin = bench.runs.many([(at, own, bench.slopes)])[0]
     slope = {}
-    for axis in _axes(path):
-        p, h = ASIDE[axis]
-        shifted = bench.runs.many([(_shifted(at, p, h, own), own, bench.slopes)])[0]
+    for axis in _axes(bench, at, path, own):
+        _, h = ASIDE[axis]
+        shifted = bench.runs.many([(_shifted(at, *ASIDE[axis], own), own, bench.slopes)])[0]
         slope[axis] = (shifted - origin) / abs(h)  # upwards for z: the depth of a contact offset counts downwards
     out = np.zeros(len(bench.y))
     for r in own:
-        motion = _motion(bench, at, path, r, origin)
+        felt = {s.component[-1]: s for s in bench.segments if s.recording == r and s.channel == "force"}
+        motion = Motion.of(bench, at, path, r)
         for s in bench.segments:
             if s.recording == r:
-                for axis, way in motion.items():
-                    out[s.rows] += slope[axis][s.rows] * way(s.time)
-                way = motion.get(s.component[-1])
-                if path.startswith("effects.support-motion.") and s.channel == "markers" and way is not None:
-                    out[s.rows] -= way(s.time) - _calm(bench, r, way)
+                for i, axis in enumerate("xyz"):
+                    if axis in slope:
+                        given = motion.gives[i] * np.interp(s.time, felt[axis].time, origin[felt[axis].rows])
+                        out[s.rows] += slope[axis][s.rows] * (motion.towards(i, s.time) + given)
+                if s.channel == "markers":
+                    out[s.rows] += _carried(bench, motion, r, s.component[-1], s.time)
     return out
 
 
-def _calm(bench: "ProbingBench", recording: str, way) -> float:
-    """Mean of a motion over the frames out of contact, from which the markers' rest is taken."""
-    setup = bench.ready.setups[recording]
+def _carried(bench: "ProbingBench", motion: "Motion", recording: str, axis: str, time: np.ndarray) -> np.ndarray:
+    """How markers ride on the support, less the mean over the frames out of contact, from which their rest is taken."""
+    setup, i = bench.ready.setups[recording], "xyz".index(axis)
     weights = np.asarray(setup.calm, float)
-    return float(weights @ way(np.asarray(setup.scene.clock.ends, float))) if weights.sum() > 0 else 0.0
+    rest = weights @ motion.carried(i, np.asarray(setup.scene.clock.ends, float)) if weights.sum() > 0 else 0.0
+    return motion.carried(i, time) - rest
 
 
-def _wave(at: Mapping[str, float], name: str, time: np.ndarray) -> np.ndarray:
-    angle = 2 * np.pi * at["effects.support-motion.frequency"] * time * (2 if name.endswith("2") else 1)
-    return np.sin(angle) if name.startswith("sin") else np.cos(angle)
+@dataclass(frozen=True)
+class Motion:
+    """What a unit of a parameter moves, by the effect's own scene.
+
+    Attributes:
+        time: s, of `path` and `lift`.
+        path: (n, 3) of the probe, m. lift: (n, 3) of the support and of the tissue with it, m.
+        gives: (3,) by how much a rig gives way more, m/N.
+    """
+
+    time: Float[np.ndarray, " n"]
+    path: Float[np.ndarray, "n 3"]
+    lift: Float[np.ndarray, "n 3"]
+    gives: Float[np.ndarray, " 3"]
+
+    @classmethod
+    def of(cls, bench: "ProbingBench", at: Mapping[str, float], path: str, recording: str) -> "Motion":
+        """Of the parameter at `path` in one recording."""
+        name, effect = path.split(".")[2], bench.runs.effects[path.split(".")[1]]
+        setup, own = bench.ready.setups[recording], _values(effect, at, recording)
+        probe = setup.scene.pressed
+        time, place = (np.asarray(x, float) for x in (probe.time, probe.position))
+
+        def moved(value):
+            scene = effect.scene(own | {name: value}, setup.test, setup.scene)
+            now, support = scene.pressed, scene.support.displacement
+            none = jnp.zeros(3)
+            return (
+                none if now.offset is None else now.offset,
+                now.time,
+                jnp.zeros((len(time), 3)) if support is None else support,
+                none if now.compliance is None else now.compliance + none,
+            )
+
+        value = jnp.asarray(own[name], probe.time.dtype)
+        slopes = jax.jvp(moved, (value,), (jnp.ones_like(value),))[1]
+        aside, late, lift, gives = (np.asarray(x, float) for x in slopes)
+        return cls(time, aside - np.gradient(place, time, axis=0) * late[:, None], lift, gives)
+
+    @property
+    def axes(self) -> str:
+        """Along which it moves the probe towards the tissue or away."""
+        along = np.abs(self.path - self.lift).max(0) + np.abs(self.gives)
+        return "".join(axis for axis, size in zip("xyz", along) if size > 0)
+
+    def towards(self, axis: int, time: Float[np.ndarray, " m"]) -> Float[np.ndarray, " m"]:
+        """Of the probe, seen from the support, m."""
+        return np.interp(time, self.time, (self.path - self.lift)[:, axis])
+
+    def carried(self, axis: int, time: Float[np.ndarray, " m"]) -> Float[np.ndarray, " m"]:
+        """Of the tissue with the support, m."""
+        return np.interp(time, self.time, self.lift[:, axis])
 
 
-def _lift(at: Mapping[str, float], recording: str, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The support's lift and its derivative by the frequency."""
-    out, slope = np.zeros(len(time)), np.zeros(len(time))
-    turned = {"sin": ("cos", 1), "cos": ("sin", -1), "sin2": ("cos2", 2), "cos2": ("sin2", -2)}
-    for name, (other, factor) in turned.items():
-        a = at.get(f"effects.support-motion.{name}.{recording}", at.get(f"effects.support-motion.{name}", 0.0))
-        out += a * _wave(at, name, time)
-        slope += a * factor * 2 * np.pi * time * _wave(at, other, time)
-    return out, slope
+def _axes(bench: "ProbingBench", at: Mapping[str, float], path: str, own: tuple[str, ...]) -> str:
+    found = {axis for r in own for axis in Motion.of(bench, at, path, r).axes}
+    return "".join(axis for axis in "xyz" if axis in found)
 
 
-def _motion(bench: "ProbingBench", at: Mapping[str, float], path: str, recording: str, origin: np.ndarray) -> dict:
-    """How the probe moves towards the tissue per unit of the parameter: functions of time by axis, z upwards."""
-    name = path.split(".")[2]
-    if name in ("dx", "dy"):
-        return {name[1]: lambda t: np.ones_like(t)}
-    if name == "depth":
-        return {"z": lambda t: -np.ones_like(t)}
-    if path.startswith("effects.support-motion."):
-        if name.startswith("lean"):
-            return {name[-1]: lambda t: -_lift(at, recording, t)[0]}
-        lean = {c: at.get(f"effects.support-motion.lean_{c}", 0.0) for c in "xy"} | {"z": 1.0}
-        if name == "frequency":
-            return {c: (lambda t, k=k: -k * _lift(at, recording, t)[1]) for c, k in lean.items()}
-        return {c: (lambda t, k=k: -k * _wave(at, name, t)) for c, k in lean.items()}
-    if name == "delay":
-        time, place = smooth_path(bench.ready.sample.recordings[recording], bench.ready.settings.smoothing)
-        rate = np.gradient(place, time, axis=0)
-        return {c: (lambda t, i=i: -np.interp(t, time, rate[:, i])) for i, c in enumerate("xyz")}
-    felt = {s.component: s for s in bench.segments if s.recording == recording and s.channel == "force"}
-    return {c: (lambda t, s=s: np.interp(t, s.time, origin[s.rows])) for c, s in felt.items()}
+def _values(effect: Effect, at: Mapping[str, float], recording: str) -> dict[str, float]:
+    """An effect's parameters in one recording, neutral where nothing is said."""
+    paths = {d.name: f"effects.{effect.name}.{d.name}" for d in effect.parameters}
+    return {n: at.get(f"{p}.{recording}", at.get(p, effect.neutral[n])) for n, p in paths.items()}
 
 
 def reported(bench: "ProbingBench", at: Mapping[str, float], path: str, h: float, origin: np.ndarray) -> np.ndarray:
@@ -165,10 +196,7 @@ def _report(bench: "ProbingBench", effect: Effect, values: Mapping[str, float], 
                 if s.recording == name and s.channel == channel:
                     put(full, s, bench.finite, origin)
             channels[channel] = Channel(np.asarray(measured[channel].time, float), full, measured[channel].unit)
-    p = {}
-    for d in effect.parameters:
-        generic = f"effects.{effect.name}.{d.name}"
-        p[d.name] = values.get(f"{generic}.{name}", values.get(generic, effect.neutral[d.name]))
+    p = _values(effect, values, name)
     out, test = {}, bench.ready.setups[name].test
     shown = channels["markers"].values.shape[1] if "markers" in channels else 0
     test = eqx.tree_at(lambda t: t.rest, test, test.rest[:shown])  # without the padding of the simulation

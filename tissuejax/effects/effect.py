@@ -58,6 +58,7 @@ class Effect(eqx.Module):
             else.
         group: of probings: effects of one group are compiled together ("rig": in every program; "" alone).
         displaces: of probings: parameters that only move the probe towards the tissue (`diagnosis.probing_free`).
+        sensed: of probings: parameters that only change what sensors report, of an effect that changes more.
         candidate: False if its size is known beforehand (weight): nothing to be found, but something to be stated.
 
     Hooks, in the order in which a material test applies them; each is the identity unless overridden:
@@ -90,6 +91,7 @@ class Effect(eqx.Module):
     added: ClassVar[bool] = False
     group: ClassVar[str] = ""
     displaces: ClassVar[tuple[str, ...]] = ()
+    sensed: ClassVar[tuple[str, ...]] = ()
     candidate: ClassVar[bool] = True
 
     @property

@@ -27,6 +27,7 @@ class Registration(Effect):
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
     group: ClassVar[str] = "rig"
     displaces: ClassVar[tuple[str, ...]] = ("dx", "dy")
+    sensed: ClassVar[tuple[str, ...]] = ("turn",)
     remembers: ClassVar[bool] = False
     misjudged: ClassVar[Mapping[str, float]] = {
         "dx": 7e-4,
