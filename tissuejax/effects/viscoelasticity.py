@@ -138,9 +138,9 @@ class Viscoelasticity(Effect):
     def _numbers(self) -> range:
         return range(1, self.terms + 1)
 
-    def long_term(self, p: Mapping[str, Array]) -> Array:
+    def long_term(self, p: Mapping[str, Array]) -> Array | float:
         """Long-term over instantaneous stiffness, 1 - sum g_i."""
-        return 1 - sum((p[f"g{i}"] for i in self._numbers), jnp.zeros(()))
+        return 1 - sum((p[f"g{i}"] for i in self._numbers), 0.0)
 
     def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:
         inverse, share, rest = state.inverse, p.get("moduli", float(self.moduli)), 1 - p.get("nominal", 0.0)
