@@ -16,9 +16,9 @@ VISIBLE = 3.0
 BEGIN, END = "<!-- pooled: written by the study -->", "<!-- end of pooled -->"
 CURRENT = {
     "material": ("material", "material-second", "material-third", "material-fourth", "material-fifth",
-                 "material-sixth", "material-seventh", "material-eighth"),
+                 "material-sixth", "material-seventh", "material-eighth", "material-ninth"),
     "probing": ("probing", "probing-strong", "probing-strong-second", "probing-pairs", "probing-second",
-                "probing-strong-third", "probing-third"),
+                "probing-strong-third", "probing-third", "probing-fourth"),
 }  # fmt: skip
 
 
