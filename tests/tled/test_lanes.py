@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from scipy.special import expit
 
+from tests.cutting.slabs import cut
 from tests.tled import cases
 from tissuejax.mesh.columns import box
 from tissuejax.mesh.facets import boundary
-from tissuejax.tled import build, contact, internal, native
+from tissuejax.tled import build, contact, faces, internal, native, step, surface
 from tissuejax.tled.blade import Wedge
 from tissuejax.tled.history import Damage, Prony
 from tissuejax.tled.lanes import library, loop
@@ -118,6 +119,44 @@ def test_contact_in_c_is_contact_by_xla(monkeypatch, form, rough):
     for a, b in zip(jax.tree.leaves(ours), jax.tree.leaves(known), strict=True):
         assert np.allclose(a, b, rtol=0, atol=1e-11 * max(np.abs(b).max(), 1e-6))  # a ball has no torque
     assert np.abs(known[0][0][0]).max() > 1e-3
+
+
+@pytest.mark.parametrize("law", ["bilinear", "trapezoidal", "exponential"])
+def test_faces_in_c_are_faces_by_xla(monkeypatch, law):
+    """Forces, memory and losses after two openings, tangents and gradients; 20 faces, no multiple of a block's 16."""
+    strength = 3000.0 * (1 + 0.01 * np.arange(20))  # of each face's own
+    scene = cut(h=1e-3, length=0.02, name=law, strength=strength)
+    scene = scene.put({"faces.values": {**scene.faces.values, "shape": jnp.array(0.4)}})  # a trapezoid's
+    joint, machine = scene.faces, step.machine(scene)
+    assert len(joint.minus) == 20
+    rng = np.random.default_rng(5)
+    apart = np.zeros((3, len(scene.body.points)))
+    apart[1, np.unique(joint.plus)] = 4e-4
+    u = jnp.asarray(apart + 1e-4 * rng.normal(size=apart.shape))
+
+    def twice(u, energy):
+        here = eqx.tree_at(lambda f: f.values["energy"], joint, energy)
+        memory = faces.unopened(here)
+        for opened in (0.6 * u, 0.7 * u + 5e-5 * jnp.sin(1e5 * u)):  # some points open further, some close
+            acting = surface.forces(None, None, here, machine.seam, index, opened, None, None, memory)
+            memory = acting.memory
+        return surface.added(acting, jnp.zeros_like(u)), acting.lost, *memory
+
+    index = surface.corners(None, joint, u.shape[1])
+
+    def found(by_c):
+        monkeypatch.setattr(native, "wanted", lambda: by_c)
+        at = u, joint.values["energy"]
+        pulled = jax.grad(lambda *a: jnp.sum(twice(*a)[0] ** 2) + jnp.sum(twice(*a)[1]), (0, 1))
+        return jax.jit(lambda *a: (jax.jvp(twice, a, along), pulled(*a)))(*at)
+
+    along = jnp.asarray(1e-4 * rng.normal(size=u.shape)), jnp.array(0.3)
+    ours, known = found(True), found(False)
+    assert native.faces(faces.by_face, joint, machine.seam, faces.unopened(joint)) is None  # as just set
+    for a, b in zip(jax.tree.leaves(ours), jax.tree.leaves(known), strict=True):
+        assert np.allclose(a, b, rtol=0, atol=1e-11 * np.abs(b).max())
+    f, lost, *_ = (np.asarray(x) for x in known[0][0])
+    assert np.abs(f).max() > 1e-5 and (lost > 0).any() and (lost == 0).any()
 
 
 def test_points_far_from_the_probe_cost_no_more_than_others():

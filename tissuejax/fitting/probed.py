@@ -103,6 +103,7 @@ def fit_probed(
     start = kept.values()
     with (progress or Silent()).stage(f"fitting {', '.join(fine.names)}", None) as stage:
         runs = Runs(problem, stage, kept, on_accept)
+        kept.keep(start, kept.closing)  # a machine's first run compiles for longer than a user waits for a sign of it
         stage.advance(note="programs")
         finest = fine.with_settings(fine.settings.finer) if finish or numerical else fine
         make_ready([runs.swift.predictor], [finest, fine], start, problem.free)

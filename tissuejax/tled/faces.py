@@ -92,11 +92,13 @@ def unopened(faces: Faces) -> Memory:
     return memory if faces.notch is None else memory._replace(secant=memory.secant * (1 - faces.notch))
 
 
-def gaps(seam: Seam, low: Float[Array, "3 v P"], high: Float[Array, "3 v P"]) -> tuple[Vector, Vector]:
-    """Opening of the points (three arrays (q, P), m) and the normals midway (three arrays (P,)), from the displacements
-    of the corners of the minus and the plus sides."""
-    shape = jnp.asarray(quadrature(low.shape[1], len(seam.ahead))[0], low.dtype)[:, :, None]
-    jump, middle = high - low, barrier(seam.x + 0.5 * (high + low))
+def gaps(
+    x: Float[Array, "3 v P"], points: int, low: Float[Array, "3 v P"], high: Float[Array, "3 v P"]
+) -> tuple[Vector, Vector]:
+    """Opening of the points (three arrays (q, P), m) and the normals midway (three arrays (P,)), from the corners at
+    rest and the displacements of those of the minus and the plus sides."""
+    shape = jnp.asarray(quadrature(low.shape[1], points)[0], low.dtype)[:, :, None]
+    jump, middle = high - low, barrier(x + 0.5 * (high + low))
     gap = barrier(sum(shape[:, a] * jump[:, a][:, None] for a in range(shape.shape[1])))
     if shape.shape[1] == 4:
         one, two = middle[:, 2] - middle[:, 0], middle[:, 3] - middle[:, 1]
@@ -107,12 +109,15 @@ def gaps(seam: Seam, low: Float[Array, "3 v P"], high: Float[Array, "3 v P"]) ->
     return tuple(gap), barrier((x * size, y * size, z * size))
 
 
-def by_face(faces: Faces, seam: Seam, high: Float[Array, "3 v P"], low: Float[Array, "3 v P"], memory: Memory) -> Held:
-    """What the faces do at displacements `high` and `low` of the corners of their plus and minus sides."""
-    gap, normal = gaps(seam, low, high)
+def by_face(
+    faces: Faces, x: Float[Array, "3 v P"], high: Float[Array, "3 v P"], low: Float[Array, "3 v P"], memory: Memory
+) -> Held:
+    """What the faces do, `x` their corners at rest, at displacements `high` and `low` of those of their plus and minus
+    sides."""
+    gap, normal = gaps(x, len(faces.area), low, high)
     acting = pull(faces.law, faces.values, faces.stiffness, faces.contact, gap, normal, memory)
     f = barrier(jnp.stack(acting.traction) * faces.area)
-    shape = jnp.asarray(quadrature(low.shape[1], len(seam.ahead))[0], f.dtype)[:, :, None]
+    shape = jnp.asarray(quadrature(low.shape[1], len(faces.area))[0], f.dtype)[:, :, None]
     at = sum(shape[q] * f[:, q][:, None] for q in range(shape.shape[0]))
     return Held(at, acting.memory, acting.lost * faces.area)
 
@@ -128,7 +133,7 @@ class Cracked(NamedTuple):
 def cracked(faces: Faces, seam: Seam, u: Float[Array, "3 N"], memory: Memory) -> Cracked:
     """How far the crack has come. Parted: opened as far as the law's end, or notched before; -inf where nothing is."""
     low, high = (u.at[:, nodes.T].get(mode="promise_in_bounds") for nodes in (faces.minus, faces.plus))
-    gap, normal = gaps(seam, low, high)
+    gap, normal = gaps(seam.x, len(faces.area), low, high)
     energy = jnp.sum(faces.area * stored(memory.secant, faces.contact, gap, normal))
     parted = memory.reached >= faces.law.end(faces.values, faces.stiffness)
     ahead = parted if faces.notch is None else parted | (faces.notch > 0)

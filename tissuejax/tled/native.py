@@ -1,5 +1,5 @@
-"""The element loop of a scene, and its contact, as compiled C (`lanes/`), where a C compiler is; elsewhere what XLA
-makes of them stands.
+"""The element loop of a scene, its contact and cohesive faces, as compiled C (`lanes/`), where a C compiler is;
+elsewhere what XLA makes of them stands.
 
 TISSUEJAX_NATIVE=off leaves all to XLA: the same to rounding. XLA copies between its stages, and each of some 55
 operations a block costs a call: the step takes 2.8 to 4.6 times what a hand-written one does (tests/bench/yardstick.c,
@@ -25,11 +25,12 @@ from tissuejax.tled.lanes.walk import Untold
 from tissuejax.tled.lanes.write import WIDTH, Slot
 
 if TYPE_CHECKING:
+    from tissuejax.tled.faces import Faces, Seam
     from tissuejax.tled.scene import Probe, Scene
 
 _kernels: dict[Any, Kernel | None] = {}
 MOST_PROGRAMS = 200  # kernels that are remembered
-FACETS = 16  # that contact takes at once: `build.PATCH`, of which all patches are multiples
+FACETS = 16  # facets and faces taken at once: `build.PATCH`, of which all patches are multiples
 
 
 def wanted() -> bool:
@@ -139,6 +140,48 @@ def contact(by_facet: Callable, probe: "Probe", patch: Any, grip: Any) -> Callab
         return out[0], out[1], out[2], out[3] if sums > 2 else None, after
 
     return touch
+
+
+def faces(by_face: Callable, joint: "Faces", seam: "Seam", memory: Any) -> Callable | None:
+    """Cohesive faces: of `u` (3, N), m, the nodal forces (3, N), N, the new memory, and what each point lost in the
+    step, J (q, P). None: XLA is to do it.
+
+    Args:
+        by_face: `faces.by_face`, of arrays whose last axis counts faces.
+    """
+    dtype, count = joint.area.dtype, joint.area.shape[-1]
+    if not wanted() or count < FACETS or dtype not in (jnp.float32, jnp.float64):
+        return None
+    bare = dataclasses.replace(joint, minus=None, plus=None, mass=None, along=None, notch=None)
+    leaves, structure = jax.tree.flatten((bare, seam.x, memory))
+    leaves = [jnp.asarray(x) for x in leaves]
+    if any(x.dtype != dtype for x in leaves):
+        return None
+    slots = [Slot("lane", x.shape[:-1]) if x.ndim else Slot("uniform", ()) for x in leaves]
+    key = ("faces", structure, tuple(slots), dtype)
+    kernel = _remembered(key, lambda: _faces(by_face, structure, slots, joint.minus.shape[1], dtype))
+    if kernel is None:
+        return None
+    cells = jnp.concatenate([joint.plus.T, joint.minus.T])
+
+    def hold(u: Float[Array, "3 N"]):
+        out = run(kernel, cells, [u, *leaves], u.shape[-1])
+        return out[0], jax.tree.unflatten(jax.tree.structure(memory), out[2:]), out[1]
+
+    return hold
+
+
+def _faces(by_face, structure, slots, corners: int, dtype) -> Kernel | None:
+    """The kernel, tried out once; None where the law has an operation without a form in C."""
+
+    def one(u, *leaves):
+        joint, x, memory = jax.tree.unflatten(structure, leaves)
+        held = by_face(joint, x, u[:, :corners], u[:, corners:], memory)
+        return [jnp.concatenate([held.at, -held.at], 1), held.lost, *jax.tree.leaves(held.memory)]
+
+    ins = [Slot("nodal", (3,)), *slots]
+    found = jax.eval_shape(one, *_shapes(ins, 2 * corners, dtype))
+    return _tried(one, 2 * corners, ins, ["nodal"] + ["lane"] * (len(found) - 1), dtype, FACETS)
 
 
 def _by_facet(place: tuple, probe: "Probe") -> bool:

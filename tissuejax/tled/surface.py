@@ -20,7 +20,7 @@ class Acting(NamedTuple):
     """What acts on the surface in one step.
 
     Attributes:
-        nodal: on the tissue, N (3, N), or None where `at` has all.
+        nodal: on the tissue, N (3, N), of what runs in C; None where `at` has all.
         at: on corners, N, to be added to the flattened forces at `index`, or None.
         force, torque: on the probe, N and N m, of each facet (3, n); sum over n.
         grip: contact's memory. rubbed: lost by friction at each point, J, or None.
@@ -60,32 +60,37 @@ def forces(
 ) -> Acting:
     """Forces of a probe whose reference point is at `centre`, and of the faces, at displacements u."""
     touch = None if probe is None else native.contact(contact.by_facet, probe, patch, grip)
-    counts = [] if probe is None else [patch.nodes.shape[1]]
+    hold = None if joint is None else native.faces(faces.by_face, joint, seam, memory)
+    sizes = [] if probe is None else [(patch.nodes.shape[1], touch is None)]
+    sizes += [] if joint is None else [(len(side), hold is None) for side in (joint.plus, joint.minus)]
+    left = [n for n, mine in sizes if mine]  # what runs in C gathers and sums by itself
+    begun, parted = 0 if touch is None else sizes[0][0], []
+    if left:
+        index = index[:, :, begun : begun + sum(left)]
+        ue = barrier(u.reshape(-1).at[index].get(mode="promise_in_bounds"))
+        parted = list(jax.lax.split(ue, left, 2))
+    force = torque = rubbed = lost = None
+    nodal, done = [], []
     if touch is not None:
-        index, counts = index[:, :, counts[0] :], []
-    counts += [] if joint is None else [len(joint.plus), len(joint.minus)]
-    if not counts:
-        nodal, force, torque, rubbed, grip = touch(u, centre)
-        return Acting(nodal, None, None, -force[:, None], -torque[:, None], grip, rubbed, None, None)
-    ue = barrier(u.reshape(-1).at[index].get(mode="promise_in_bounds"))
-    parted = list(jax.lax.split(ue, counts, 2))
-    nodal = force = torque = rubbed = lost = None
-    done = []
-    if touch is not None:
-        nodal, force, torque, rubbed, grip = touch(u, centre)
+        f, force, torque, rubbed, grip = touch(u, centre)
         force, torque = -force[:, None], -torque[:, None]
+        nodal.append(f)
     elif probe is not None:
         pressed = contact.by_facet(probe, patch.x, parted.pop(0), centre, grip)
         f, x, grip, rubbed = pressed.f, pressed.x, pressed.grip, pressed.lost
         force = -jnp.sum(f, 1)
         torque = -jnp.stack([jnp.sum(x[i - 2] * f[i - 1] - x[i - 1] * f[i - 2], 0) for i in range(3)])
         done.append(pressed.at_nodes)
-    if joint is not None:
-        held = faces.by_face(joint, seam, *parted, memory)
+    if hold is not None:
+        f, memory, lost = hold(u)
+        nodal.append(f)
+    elif joint is not None:
+        held = faces.by_face(joint, seam.x, *parted, memory)
         memory, lost = held.memory, held.lost
         done += [held.at, -held.at]
-    at = barrier(jnp.concatenate(done, 2))
-    return Acting(nodal, at, index, force, torque, grip, rubbed, memory, lost)
+    at = barrier(jnp.concatenate(done, 2)) if done else None
+    own = sum(nodal) if nodal else None
+    return Acting(own, at, index if done else None, force, torque, grip, rubbed, memory, lost)
 
 
 def added(acting: Acting, f: Float[Array, "3 N"]) -> Float[Array, "3 N"]:

@@ -31,7 +31,7 @@ class Kernel:
         closed: traced function of arrays (c, k, 1) "nodal", (..., 1) "lane", (...) "uniform".
         corners: nodes of an element.
         ins, outs: what the arguments after the cells, and the results, are; never batched here.
-        width: elements of a block; their number must be a multiple of it.
+        width: elements of a block; there must be as many.
     """
 
     def __init__(
@@ -154,8 +154,8 @@ def _avals(kernel: Kernel, batched, count: int, cells, arguments):
 
 
 def _call(cells, *arguments, kernel: Kernel, batched, count: int):
-    if cells.shape[-1] % kernel.width:
-        raise ValueError(f"{cells.shape[-1]} elements: the loop takes multiples of {kernel.width}")
+    if cells.shape[-1] < kernel.width:
+        raise ValueError(f"{cells.shape[-1]} elements: the loop takes {kernel.width} or more")
     try:
         name = kernel.name(str(arguments[0].dtype), batched)
     except (Untold, NotCompiled):  # a derivative may have operations that the function has not

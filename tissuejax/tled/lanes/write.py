@@ -1,7 +1,8 @@
 """C of a loop over elements from the tape of one lane: gather at the nodes, arithmetic in vectors, add up at the nodes.
 
 Elements are taken in blocks (of `WIDTH` where nothing else is said), so that what passes from stage to stage stays in
-the first cache. What does not depend on the batch (the tangents of a Jacobian, say) is worked out once for all of it.
+the first cache. A last block that would not be full begins earlier: what it does again it neither adds up nor sums.
+What does not depend on the batch (the tangents of a Jacobian, say) is worked out once for all of it.
 The C is plain: vectors come from the compiler's `omp simd`. It may neither reorder nor fuse a product into a sum: then
 what adds zero changes no bit of the rest, whatever stands around it, and an effect at its neutral value is neutral.
 """
@@ -214,7 +215,9 @@ class _Writer:
             f"real sum{i}[{s.rows}][{self.width}] = {{{{0}}}};" for i, s in enumerate(self.outs) if s.kind == "uniform"
         ]
         lines = [] if self.batch else sums
-        lines += [f"for (int64_t e = 0; e < E; e += {self.width}) {{"]
+        lines += [f"for (int64_t first = 0; first < E; first += {self.width}) {{"]
+        lines += [f"  const int64_t e = first + {self.width} > E ? E - {self.width} : first;"]
+        lines += ["  const int done = (int)(first - e);"]
         before, inside = self._loads(False)
         work = [self.statement(n) for n in self.order if n.level == LANE and n.op != "input"]
         if not self.batch:
@@ -252,7 +255,7 @@ class _Writer:
                 elif slot.kind == "lane":
                     lines.append(f"out{i}[{which}{r} * E + e + i] = {said};")
                 else:
-                    lines.append(f"sum{i}[{r}][i] += {said};")
+                    lines.append(f"sum{i}[{r}][i] += i < done ? 0 : {said};")
         return lines
 
     def _scatter(self, b: str) -> list[str]:
@@ -260,7 +263,7 @@ class _Writer:
         nodal = [(i, s) for i, s in enumerate(self.outs) if s.kind == "nodal"]
         if not nodal:
             return []
-        lines += [f"for (int i = 0; i < {self.width}; i++) {{"]
+        lines += [f"for (int i = done; i < {self.width}; i++) {{"]
         lines += [f"  for (int a = 0; a < {k}; a++) {{", "    const int64_t at = cells[a * E + e + i];"]
         for i, slot in nodal:
             lines += [f"    out{i}[({b} * {slot.rows} + {c}) * N + at] += o{i}[{c * k} + a][i];"
