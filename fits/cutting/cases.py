@@ -266,8 +266,8 @@ def _differences(plain, J, steps, over: int) -> dict:
 
 
 def cost() -> dict:
-    """Time of a step on about 1,000 hexes: bare, with faces, with faces and blade; least of some runs of 1,620 steps, in
-    which what is worked out once a run is lost."""
+    """Time of a step on about 1,000 hexes: bare, with faces, with faces and blade; least of some runs of 1,620
+    steps, in which what is worked out once a run is lost."""
     base = cut(h=5e-4, length=0.025, travel=0.006, frames=2, bulk=2e4)
     count = base.clock.steps * base.clock.frames
     out = {"hexes": len(base.body.cells), "faces": len(base.faces.minus)}

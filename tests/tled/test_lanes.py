@@ -156,7 +156,9 @@ def test_faces_in_c_are_faces_by_xla(monkeypatch, law):
     for a, b in zip(jax.tree.leaves(ours), jax.tree.leaves(known), strict=True):
         assert np.allclose(a, b, rtol=0, atol=1e-11 * np.abs(b).max())
     f, lost, *_ = (np.asarray(x) for x in known[0][0])
-    assert np.abs(f).max() > 1e-5 and (lost > 0).any() and (lost == 0).any()
+    assert np.abs(f).max() > 1e-5
+    assert (lost > 0).any()
+    assert (lost == 0).any()
 
 
 def test_points_far_from_the_probe_cost_no_more_than_others():
