@@ -48,10 +48,17 @@ def test_a_simulated_tension_test_is_the_textbook_one_and_can_be_fitted(tmp_path
     assert abs(fit["value"] - 3000) < 4 * fit["std"]
     predicted = ["predict", str(tmp_path / "fit" / "result.json"), str(file), "-o", str(tmp_path / "p"), "--json"]
     assert main(predicted) == 0
+    apart = json.loads(capsys.readouterr().out)["errors"]["uniaxial/nominal_stress"]
+    differences = []
     for row in rows(tmp_path / "p" / "uniaxial-nominal_stress.csv"):
         l = row["stretch (1)"]
         assert row["nominal_stress (Pa)"] == pytest.approx(fit["value"] * (l - l**-2), abs=1e-3)
-        assert abs(row["nominal_stress measured (Pa)"] - row["nominal_stress (Pa)"]) < 5 * 15 + 1
+        differences.append(row["nominal_stress measured (Pa)"] - row["nominal_stress (Pa)"])
+        assert abs(differences[-1]) < 5 * 15 + 1
+    assert apart["rmse"] == pytest.approx(np.sqrt(np.mean(np.square(differences))), rel=1e-6)
+    assert apart["rmse"] == pytest.approx(15.0, rel=0.5)  # the noise that was added, 41 samples
+    assert main([*predicted[:-1], "--force"]) == 0
+    assert "RMSE" in capsys.readouterr().out
 
 
 def test_what_cannot_be_simulated_is_refused(tmp_path, capsys):

@@ -1,6 +1,7 @@
 """`tissuejax simulate` and what it shares with `predict`: a material and a path give a recording."""
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar
 
@@ -13,6 +14,7 @@ from tissuejax.energies.catalogue import volumetric
 from tissuejax.errors import InputError
 from tissuejax.experiments.predictor import predictor
 from tissuejax.experiments.virtual import as_measured, corners, material_test, probing
+from tissuejax.fitting.scores import Score, scores
 from tissuejax.model import Model
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.delimited import load
@@ -21,6 +23,7 @@ from tissuejax.recordings.exports.text import is_number
 from tissuejax.recordings.files import read, write
 from tissuejax.recordings.recording import Recording, Sample
 from tissuejax.report.recording_tables import write_table
+from tissuejax.report.scales import display
 from tissuejax.units import factor, quantity
 
 BULK = 20  # bulk over shear modulus of a body fitted as incompressible, where it has to be simulated
@@ -154,8 +157,13 @@ def simulated(
         )
     peaks = {n: _peaks(r) for n, r in recorded.items()}
     lines = [f"{n}: " + ", ".join(f"{c} to {v:.4g} {u}" for c, (v, u) in p.items()) for n, p in peaks.items()]
+    errors = _errors(sample.recordings, predicted) if measured else {}
+    for key, s in errors.items():
+        scale, unit = display(s.unit, s.rmse)
+        lines.append(f"  {key:<24}RMSE {f'{s.rmse / scale:.3g} {unit}':<12}R2 {s.r2:.4f}")
     lines += [f"  ! {note}" for note in notes] + [f"{k:<24} {p}" for k, p in files.items()]
     record = {"recordings": peaks, "notes": notes, "files": {k: str(p) for k, p in files.items()}}
+    record |= {"errors": {k: {"rmse": s.rmse, "unit": s.unit, "r2": s.r2} for k, s in errors.items()}} if errors else {}
     return Reply(record, "\n".join(lines))
 
 
@@ -176,6 +184,12 @@ def _peaks(recording: Recording) -> dict[str, tuple[float, str]]:
     return {
         name: (float(np.nanmax(np.abs(np.asarray(c.values, float)))), c.unit) for name, c in recording.channels.items()
     }
+
+
+def _errors(measured: Mapping[str, Recording], predicted: Mapping[str, Recording]) -> dict[str, Score]:
+    """How far the prediction is from what was measured, by recording/channel."""
+    channels = [f"{n}/{c}" for n, made in predicted.items() for c in made.channels]
+    return scores(measured, predicted, dict.fromkeys(channels, 1.0))
 
 
 def table(path: str, what: str, si: str) -> tuple[np.ndarray, np.ndarray]:

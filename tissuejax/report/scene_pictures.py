@@ -95,6 +95,7 @@ def write_pictures(subject: Film, folder: Path, animate: bool = True) -> dict[st
     except ImportError as error:
         raise InputError(MISSING) from error
     pyvista.OFF_SCREEN = True
+    pyvista.vtk_verbosity("off")  # without a display it warns of just that
     most = max(float(f.moved.max()) for f in subject.frames) or 1.0
     written = {}
     target = folder / f"{subject.name}.png"
