@@ -18,7 +18,7 @@ from tissuejax.tled.scene import Scene
 
 
 class Machine(NamedTuple):
-    """What is worked out once a run from the scene; `per_mass` is 1 / mass (a division costs more than the rest)."""
+    """What is worked out once a run from the scene."""
 
     scene: Scene
     mesh: internal.Mesh
@@ -26,7 +26,6 @@ class Machine(NamedTuple):
     patch: contact.Patch | None
     skin: capsule.Skin | None
     mass: Float[Array, " N"]
-    per_mass: Float[Array, " N"]
     weight: Float[Array, "3 N"] | None
     glide: Glide | None
     seam: faces.Seam | None = None
@@ -93,7 +92,7 @@ def machine(scene: Scene) -> Machine:
     slides = None if scene.support.compliance is None else glide(scene, mass, hold.area)
     touched = probe is not None or scene.faces is not None
     corners = surface.corners(patch, scene.faces, len(scene.body.points)) if touched else None
-    return Machine(scene, mesh, hold, patch, skin, mass, 1.0 / mass, weight, slides, seam, corners)
+    return Machine(scene, mesh, hold, patch, skin, mass, weight, slides, seam, corners)
 
 
 def start(m: Machine) -> State:
@@ -162,13 +161,13 @@ def advance(m: Machine, state: State, drive: Drive) -> tuple[State, Felt]:
     f = f if acting is None else surface.added(acting, f)
     half = 0.5 * settings.mass_damping * h
     moving = f if m.glide is None else spurred(scene, m.glide, f, state.slip.elastic, m.hold.area, m.mass)
-    driven = (1.0 - half) * v + moving * (h * m.per_mass)
+    driven = (1.0 - half) * v + h * moving / m.mass
     driven = driven if drive.pace is None else driven + 2.0 * half * drive.pace[:, None]
-    pushed = driven * (1.0 / (1.0 + half))
+    pushed = driven / (1.0 + half)
     slip = support.slide(scene, m.hold, state.slip, f, moving, m.mass) if support.slips(scene) else state.slip
     moved = u + h * pushed
     moved = jnp.where(m.hold.held, support.target(scene, m.hold, slip, drive.motion), moved)
-    pushed = jnp.where(m.hold.held, (moved - u) * (1.0 / h), pushed)
+    pushed = jnp.where(m.hold.held, (moved - u) / h, pushed)
     moved, pushed = barrier((moved, pushed))
     reaction = jnp.sum(scene.body.held.T * f[:, scene.body.fixed], axis=1)  # force of the tissue on the support
     spent = None if scene.faces is None else _spent(m, acting, inner, f, v, pushed)
