@@ -1,5 +1,7 @@
 """Fits of relaxing specimens: number of terms, their sum, their times, where they start; data from own formulas."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -8,12 +10,12 @@ from tissuejax.effects.catalogue import effect
 from tissuejax.errors import InputError
 from tissuejax.estimation.transforms import Box, Sticks, chained, unchained
 from tissuejax.experiments.predictor import predictor
-from tissuejax.fitting.idle import merged, woken
+from tissuejax.fitting.idle import merged, roused, woken
 from tissuejax.fitting.idle import terms as idle_terms
 from tissuejax.fitting.least_squares import descend
 from tissuejax.fitting.options import Unknowns
 from tissuejax.fitting.setup import problem, split
-from tissuejax.fitting.starts import neutral
+from tissuejax.fitting.starts import fitted_moduli, neutral
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 ONCE = tj.Search(multistart=1)
@@ -68,6 +70,28 @@ def test_one_term_is_found_on_tension_and_compression_together():
     moduli = found.record()["shear_modulus"]
     assert moduli["instantaneous"] == pytest.approx(MU, rel=0.03)
     assert moduli["long_term"] == pytest.approx(0.65 * MU, rel=0.03)
+
+
+@pytest.mark.parametrize("terms", [1, 2, 3])
+@pytest.mark.parametrize(("energy", "seen"), [("reduced-polynomial-2", 1.1), ("demiray", 3.0)])
+def test_one_start_leads_to_the_relaxation_that_is_there(energy, seen, terms):
+    """From a share of zero at the middle time, a whole step led into a corner: all of the stress, with the longest
+    time (chi-square 115 times the noise). The recording is `data/make_demo.py`'s, by closed forms."""
+    sample = tj.read(Path(__file__).parents[2] / "data/demo/relaxing.h5")
+    found = tj.fit(sample, energy, effects=[f"viscoelasticity-{terms}"], holdout=["holdout"], search=ONCE)
+    assert found.chi2_per_dof < seen
+    share = sum(v for path, v in found.values.items() if path.startswith("effects.viscoelasticity.g"))
+    assert share == pytest.approx(0.35, abs=0.01)
+
+
+def test_an_idle_series_begins_near_its_time_by_one_term_and_once():
+    model = tj.material("neo-hookean", effects=["viscoelasticity-2"])
+    posed = problem(predictor(model, pulled([(0.35, 8.0)]), ("r1", "r2")))
+    begun = roused(posed, fitted_moduli(posed, posed.start))
+    woken_terms = [i for i in (1, 2) if begun[f"effects.viscoelasticity.g{i}"] > 0]
+    assert len(woken_terms) == 1
+    assert 2 < begun[f"effects.viscoelasticity.tau{woken_terms[0]}"] < 32  # a factor of 4 about the truth
+    assert roused(posed, begun) == begun
 
 
 def test_the_sum_of_the_shares_stays_below_one_where_the_data_would_have_more():

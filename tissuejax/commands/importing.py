@@ -137,7 +137,12 @@ def _said(guess: Guess, side: Path, given: argparse.Namespace) -> Reply:
         lines.append("FILL IN" + (", and look at what each column is." if guess.experiment == "cutting" else now))
         return Reply(record, "\n".join(lines), 2)
     for name in names(side):
-        sample = read(side, name)
+        try:
+            sample = read(side, name)
+        except InputError as fault:
+            raise InputError(
+                f"{fault} ({side} was written: mend it there, or say it otherwise here, with --force)"
+            ) from None
         for key, recording in sample.recordings.items():
             units = {i.path: f" {i.unit}" for i in layout(recording.experiment) if i.unit != "1"}
             spans = {k: (v, units.get(k, "")) for k, v in recording.inputs.items() if "time" not in k}

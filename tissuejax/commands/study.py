@@ -78,14 +78,20 @@ def _note(script: Path, done: dict) -> None:
     """Write into `run.json` beside the numbers when and by which code a script ran."""
     path = script.parent / "run.json"
     kept = json.loads(path.read_text()) if path.exists() else {}
-    asked = ["git", "-C", str(source.ROOT), "describe", "--always", "--dirty", "--exclude", "*"]
-    try:
-        commit = subprocess.run(asked, capture_output=True, text=True).stdout.strip()
-    except OSError:  # no git here
-        commit = ""
+    commit = _git("rev-parse", "--short=7", "HEAD")
+    if _git("status", "--porcelain", "--", str(source.ROOT), str(script.resolve())):
+        commit += "-dirty"
     now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     said = {"date": now, "commit": commit or None, "source": source.LOADED, "seconds": round(done["seconds"], 1)}
     write_json(path, kept | {script.name: said | {"answer": done["answer"]}})
+
+
+def _git(*asked: str) -> str:
+    """What git says of this checkout; nothing where there is no git, or no checkout."""
+    try:
+        return subprocess.run(["git", "-C", str(source.ROOT), *asked], capture_output=True, text=True).stdout.strip()
+    except OSError:
+        return ""
 
 
 def _copied(script: Path, out: Path) -> Path:

@@ -1,8 +1,9 @@
-"""Terms of a series that a descent left idle, woken at another time.
+"""Terms of a series that are idle, woken at the time where they promise most.
 
-A relaxation term whose share has come to rest at zero has no slope in its time, so no step brings it to where it would
-be needed; two terms at one time are one. The misfit's gain is then foretold for times all over the allowed range by one
-linear step of the share beside everything else that is free (the score test), and the descent goes on from the best.
+A relaxation term whose share is zero has no slope in its time, so no step brings it to where it would be needed: a
+whole step of the share at another time may lead into a corner of its box, where a descent stays. Two terms at one time
+are one. The misfit's gain is foretold for times all over the allowed range by one linear step of the share beside
+everything else that is free (the score test), and a descent begins, or goes on, from the best.
 
 Source: Rao 1948, Proc. Camb. Phil. Soc. 44:50 (score test).
 """
@@ -19,8 +20,8 @@ TIMES = 9  # at which a share is scored
 WAKING = (0.01, 0.3)  # least and greatest share with which a term is woken
 
 
-def terms(problem: Problem) -> list[list[tuple[str, str]]]:
-    """(share, time) of all terms of each effect that has several, both free in the fit."""
+def terms(problem: Problem, several: int = 2) -> list[list[tuple[str, str]]]:
+    """(share, time) of all terms of each effect that has `several` of them, both free in the fit."""
     found = []
     for effect in problem.predictor.model.effects:
         pairs = [
@@ -28,7 +29,7 @@ def terms(problem: Problem) -> list[list[tuple[str, str]]]:
             for share, time in zip(getattr(effect, "shares", ()), getattr(effect, "times", ()))
         ]
         free = [pair for pair in pairs if set(pair) <= set(problem.free)]
-        if len(free) > 1:
+        if len(free) >= several:
             found.append(free)
     return found
 
@@ -53,22 +54,46 @@ def woken(problem: Problem, values: Mapping[str, float]) -> dict[str, float] | N
     if not idle:
         return None
     share, time = idle[0]
+    found = _promising(problem, values, share, time, {path for pair in idle for path in pair})
+    return None if found is None else values | found
+
+
+def roused(problem: Problem, values: Mapping[str, float]) -> dict[str, float]:
+    """Values with each series whose shares are all zero begun at the time that promises most, by the term next to it.
+
+    Series that would not help stay as they are.
+    """
+    values = dict(values)
+    for series in terms(problem, several=1):
+        if any(values[share] != 0 for share, _ in series) or any(p in problem.priors for pair in series for p in pair):
+            continue
+        found = _promising(problem, values, *series[0], {path for pair in series for path in pair})
+        if found is not None:
+            step, t = (found[path] for path in series[0])
+            share, time = min(series, key=lambda pair: abs(np.log(values[pair[1]] / t)))
+            values |= {share: step, time: t}
+    return values
+
+
+def _promising(
+    problem: Problem, values: Mapping[str, float], share: str, time: str, apart: set[str]
+) -> dict[str, float] | None:
+    """Share and time of one term where it promises most, beside all that is free but what is set `apart`."""
     lower, upper = problem.bound(time)
     best, found = 0.0, None
-    others = [i for i, path in enumerate(problem.free) if path not in {p for pair in idle for p in pair}]
+    others = [i for i, path in enumerate(problem.free) if path not in apart]
     for t in np.geomspace(max(lower, 1e-9 * upper), upper, TIMES + 2)[1:-1]:
-        r, jacobian = problem.linearised(values | {share: 0.0, time: float(t)})
+        r, jacobian = problem.linearised({**values, share: 0.0, time: float(t)})
         if not (np.isfinite(r).all() and np.isfinite(jacobian).all()):
             continue
         rest = jacobian[:, others]
         size = np.linalg.norm(rest, axis=0)
         u, s, _ = np.linalg.svd(rest[:, size > 0] / size[size > 0], full_matrices=False)
-        u = u[:, s > 1e-10 * s[0]]
+        u = u[:, s > 1e-10 * s[:1]]
         column = jacobian[:, problem.free.index(share)]
         column = column - u @ (u.T @ column)
         downhill, length = -float(column @ r), float(column @ column)
         if length > 0 and downhill > 0 and downhill**2 / length > best:
             best = downhill**2 / length
-            step = float(np.clip(downhill / length, *WAKING))
-            found = values | {share: step, time: float(t)}
+            found = {share: float(np.clip(downhill / length, *WAKING)), time: float(t)}
     return found

@@ -26,7 +26,7 @@ from tissuejax.estimation.stability import recorded_stability
 from tissuejax.estimation.transforms import chained
 from tissuejax.fitting.advice import warnings_of
 from tissuejax.fitting.gradient_descent import GRADIENT_METHODS, gradient_descent
-from tissuejax.fitting.idle import terms, woken
+from tissuejax.fitting.idle import roused, terms, woken
 from tissuejax.fitting.options import Search
 from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
@@ -141,12 +141,15 @@ def fit(
     first = dict(problem.start) | dict(start or {})
     if start is None and not separable(problem):
         first = fitted_moduli(problem, first)
+    bare = first
+    if start is None:
+        first = roused(problem, first)
     tries = [first, *variations(problem, first, multistart - 1, search.seed)]
     n, ends = 0, []
     options = {"method": method, "max_steps": max_steps, "on_accept": on_accept}
     for held in neutral(problem) if start is None and multistart > 1 else ():
         smaller = replace(problem, free=tuple(p for p in problem.free if p not in held))
-        inside = descend(smaller, first, method=method, max_steps=max_steps)
+        inside = descend(smaller, bare, method=method, max_steps=max_steps)
         n += inside.runs
         if np.isfinite(inside.cost):
             tries.append(smaller.values(inside.y))
