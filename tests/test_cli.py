@@ -218,3 +218,36 @@ def test_a_warning_is_one_line_and_that_of_a_library_none(capsys):
     _warned(UserWarning("the cache may be written by others"), UserWarning, "programs.py", 3)
     _warned(FutureWarning("this library moves"), FutureWarning, "library.py", 3)
     assert capsys.readouterr().err == "tissuejax: the cache may be written by others\n"
+
+
+def test_a_result_that_is_not_there_is_called_that(tmp_path, capsys):
+    assert main(["export", str(tmp_path / "no.json"), "--to", "abaqus"]) == 2
+    assert "no such file" in capsys.readouterr().err
+    assert main(["export", str(tmp_path), "--to", "abaqus"]) == 2
+    assert "found a folder" in capsys.readouterr().err
+    (tmp_path / "other.json").write_text("{}")
+    assert main(["export", str(tmp_path / "other.json"), "--to", "abaqus"]) == 2
+    assert "it has no 'energy'" in capsys.readouterr().err
+
+
+def test_one_energy_of_the_catalogue_is_shown_by_any_of_its_names(capsys):
+    for typed, shown in {"Yeoh": "reduced-polynomial-N", "hgo": "hgo", "ogden-3+fibre": "ogden-N"}.items():
+        assert main(["energies", typed]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert lines[0] == shown
+        assert [line for line in lines if not line.startswith(" ")] == [shown] + ["+fibre"] * ("+fibre" in typed)
+    assert main(["energies", "nope"]) == 2
+    assert "unknown energy" in capsys.readouterr().err
+
+
+def test_sensitivities_of_a_fit_with_one_relaxation_term(tmp_path, capsys):
+    """The record names the effect; its number of terms is told by its constants."""
+    recordings = str(Path(__file__).parents[1] / "data/demo/relaxing.h5")
+    asked = ["--energy", "reduced-polynomial-2", "--effect", "viscoelasticity-1", "--out", str(tmp_path / "fit")]
+    assert main(["fit", recordings, *asked, "--multistart", "1", "--start", "energy.C10=400 Pa"]) == 0
+    capsys.readouterr()
+    result = str(tmp_path / "fit/result.json")
+    assert main(["sensitivity", recordings, "--result", result, "--out", str(tmp_path / "s"), "--json"]) == 0
+    told = capsys.readouterr().out
+    assert "effects.viscoelasticity.tau1" in told
+    assert "effects.viscoelasticity.tau2" not in told

@@ -121,7 +121,7 @@ def fit(
     if first is not None:
         begun = kind.begin(posed, first, start or {})
         posed = replace(posed, start=dict(posed.start) | begun.start)
-    found = kind.fit(posed, held, search, bool(start), progress)
+    found = kind.fit(posed, held, search, frozenset(start or ()), progress)
     found.warnings.extend(f"Look at the data: {sentence}." for sentence in slips(sample, (*fitted, *held)))
     return found if begun is None else replace(found, first=begun)
 

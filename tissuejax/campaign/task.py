@@ -143,7 +143,7 @@ def _solved(task: Task) -> dict[str, Any]:
         for kind in (Unknowns, Objective, Search)
     )
     posed = problem(predictor(model, sample, fitted), unknowns, objective)
-    start = dict(posed.start) if unknowns.start else None
+    start = {path: posed.start[path] for path in unknowns.start or ()} or None
     search = replace(search, multistart=s.multistart, seed=s.seed)
     found = fit(posed, start=start, search=search, holdout=held)
     return {name: value for name, value in found.record().items() if name not in UNSTORED}

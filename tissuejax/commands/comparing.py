@@ -1,7 +1,6 @@
 """`tissuejax compare`: energies and effects on one sample, in one table and on one page."""
 
 import argparse
-import json
 from pathlib import Path
 from typing import ClassVar
 
@@ -9,6 +8,7 @@ from tissuejax import verbs
 from tissuejax.commands.arguments import add_fit, fit_options
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.outputs import add_out, folder, made
+from tissuejax.commands.results import FAULTS, no_result, read_record
 from tissuejax.errors import InputError, TissueError, unknown
 from tissuejax.fitting.comparison import compare, name_of
 from tissuejax.progress import for_terminal
@@ -139,13 +139,11 @@ def _records(files: list[str]) -> dict[str, dict]:
     found = {}
     for file in files:
         try:
-            record = json.loads(Path(file).read_text())
+            record = read_record(Path(file))
             name = name_of(record)
             record["channels"], record["noise"], record["parameters"]
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise InputError(
-                f"{file}: not a result.json of `tissuejax fit` ({error}); give the one in its --out"
-            ) from error
+        except FAULTS as error:
+            raise no_result(Path(file), error) from error
         found[name if name not in found else f"{name} ({Path(file).parent})"] = record
     if len(found) < 2:
         raise InputError("one result alone can't be compared; give two or more, or recordings and --energy")

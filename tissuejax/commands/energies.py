@@ -8,7 +8,7 @@ from tissuejax import verbs
 from tissuejax.commands.arguments import values
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.outputs import folder_named
-from tissuejax.energies.catalogue import entries
+from tissuejax.energies.catalogue import entries, entries_of
 from tissuejax.energies.published import PUBLISHED
 from tissuejax.errors import InputError
 from tissuejax.parameters import checked
@@ -27,13 +27,15 @@ The catalogue of strain energies. Names are typed with their order (ogden-3, red
 fibre family to any of them. Ogden constants mean nothing without their form, so ogden-N asks for --ogden-form.
 
   tissuejax energies                                     all of them
+  tissuejax energies hgo                                 one of them
   tissuejax energies --plot gent --out out               nominal stress in three modes, and where it is stable
   tissuejax energies --plot ogden-2 --ogden-form 2mu/alpha^2 --set energy.mu1=1kPa
   tissuejax energies --plot in-vivo-3                    a material published by Lister 2012
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
-        """--plot and what goes with it."""
+        """NAME, or --plot and what goes with it."""
+        parser.add_argument("energy", metavar="NAME", nargs="?", help="this energy alone")
         parser.add_argument("--plot", metavar="NAME", help="picture of this energy or published material")
         parser.add_argument("--ogden-form", metavar="FORM", help="what Ogden constants mean")
         parser.add_argument(
@@ -50,7 +52,8 @@ fibre family to any of them. Ogden constants mean nothing without their form, so
         """The list, or the picture."""
         if given.plot:
             return self._plot(given)
-        found = entries()
+        found = entries_of(given.energy) if given.energy else entries()
+        ready = {} if given.energy else PUBLISHED
         record = {
             "energies": {
                 name: {
@@ -65,7 +68,7 @@ fibre family to any of them. Ogden constants mean nothing without their form, so
                 for name, e in found.items()
             },
             "published": {
-                name: {"energy": m.energy_name, "values": m.values, "where": m.where} for name, m in PUBLISHED.items()
+                name: {"energy": m.energy_name, "values": m.values, "where": m.where} for name, m in ready.items()
             },
         }
         lines = []
@@ -79,8 +82,8 @@ fibre family to any of them. Ogden constants mean nothing without their form, so
                 f"    valid          {e.valid}",
                 f"    source         {e.source}",
             ]
-        lines += ["", "published materials, ready to use:"]
-        lines += [f"  {name:<15} {m.energy_name:<22} {m.where}" for name, m in PUBLISHED.items()]
+        lines += ["", "published materials, ready to use:"] * bool(ready)
+        lines += [f"  {name:<15} {m.energy_name:<22} {m.where}" for name, m in ready.items()]
         return Reply(record, "\n".join(lines))
 
     def _plot(self, given: argparse.Namespace) -> Reply:

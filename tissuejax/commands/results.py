@@ -13,6 +13,7 @@ from tissuejax.model import Model
 from tissuejax.parameters import checked
 
 NOT_A_RESULT = "not a result.json of `tissuejax fit`"
+FAULTS = (ValueError, KeyError, TypeError, AttributeError)  # of reading a record that is another's
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ def read_result(path: Path) -> Known:
         InputError: unreadable, or not a result of a fit.
     """
     try:
-        record = json.loads(Path(path).read_text())
+        record = read_record(path)
         energy, parameters = record["energy"], record["parameters"]
         model = verbs.material(
             energy["name"],
@@ -85,13 +86,37 @@ def read_result(path: Path) -> Known:
             effects=effects_of(record),
         )
         values = {path: float(p["value"]) for path, p in parameters.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{path}: {NOT_A_RESULT} ({error}); give the one in its --out") from error
+    except FAULTS as error:
+        raise no_result(path, error) from error
     model = model.across(tuple(record["recordings"]))
     left = sorted(set(model.parameters) ^ set(values))
     if left:
         raise InputError(f"{path}: made by another version ({', '.join(left[:4])} differ); fit again")
     return Known(str(record["sample"]), model, values, record)
+
+
+def read_record(path: Path) -> dict:
+    """What a JSON file holds.
+
+    Raises:
+        InputError: there is none, or it can't be read.
+        ValueError: it is no JSON.
+    """
+    path = Path(path)
+    try:
+        return json.loads(path.read_text())
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; wanted is the result.json in the --out of `tissuejax fit`") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: found a folder, expected a file: {path / 'result.json'}") from None
+    except OSError as error:
+        raise InputError(f"{path}: can't be read ({error.strerror})") from error
+
+
+def no_result(path: Path, error: Exception) -> InputError:
+    """That a file is not a fit's record."""
+    lacking = f"it has no {error}" if isinstance(error, KeyError) else str(error)
+    return InputError(f"{path}: {NOT_A_RESULT} ({lacking}); give the one in its --out")
 
 
 def effects_of(record: dict) -> list[str]:

@@ -1,16 +1,15 @@
 """`tissuejax sensitivity`: what each parameter does to each channel, and what can't be told apart."""
 
 import argparse
-import json
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
-from tissuejax import verbs
 from tissuejax.commands.arguments import positive, ranges
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.outputs import add_out, folder, made
+from tissuejax.commands.results import read_result
 from tissuejax.energies.catalogue import name_of
 from tissuejax.energies.published import published
 from tissuejax.errors import InputError
@@ -153,25 +152,18 @@ def _published(given):
 def _fitted(given):
     if given.file is None:
         raise InputError("--result needs the FILE that it was fitted to, before it")
-    try:
-        record = json.loads(given.result.read_text())
-        energy, parameters = record["energy"], record["parameters"]
-        form = energy["forms"].get("ogden")
-        model = verbs.material(
-            energy["name"], ogden_form=form, volumetric=energy["volumetric"], effects=record["effects"]
-        )
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{given.result}: not a result.json of `tissuejax fit` ({error})") from error
+    known = read_result(given.result)
+    record, parameters = known.record, known.record["parameters"]
     sample = read(given.file)
     missing = [name for name in record["recordings"] if name not in sample.recordings]
     if missing:
         raise InputError(f"{given.file} has no recording {', '.join(missing)}, to which {given.result} was fitted")
     names = tuple(record["recordings"])
-    made = predictor(model, sample, names)
-    values = checked({path: p["value"] for path, p in parameters.items()}, made.model.parameters)
+    made = predictor(known.model, sample, names)
+    values = checked(known.values, made.model.parameters)
     paths = tuple(path for path, p in parameters.items() if p["free"])
     std = {key: n["std"] for key, n in record["noise"].items()}
-    return model, values, made, noise(sample, names, std), paths
+    return made.model, values, made, noise(sample, names, std), paths
 
 
 def _around(value: float, share: float, parameter) -> tuple[float, float]:

@@ -86,6 +86,22 @@ def entries() -> dict[str, Entry]:
     return lines
 
 
+def entries_of(name: str) -> dict[str, Entry]:
+    """The lines of `entries` that an energy's name stands for: its own and that of its addition; orders don't matter.
+
+    Raises:
+        InputError: unknown name (the nearest are offered).
+    """
+    every = entries()
+    stem, plus, addition = name.strip().lower().replace(" ", "-").partition("+")
+    stem = re.sub(r"-(\d+|n)$", "", ALIASES.get(stem, stem))
+    wanted = [f"{stem}-N" if f"{stem}-N" in every else stem] * bool(stem) + [f"+{addition}"] * bool(plus)
+    for line in wanted:
+        if line not in every:
+            raise unknown("energy", line, [*every, *ALIASES])
+    return {line: every[line] for line in wanted}
+
+
 def examples(ogden_form: str = "2mu/alpha^2", order: int = 2) -> dict[str, Energy]:
     """One of each energy, and the neo-Hookean one with each addition, by name: for tables, plots and test batteries."""
     found = {}

@@ -58,16 +58,17 @@ def woken(problem: Problem, values: Mapping[str, float]) -> dict[str, float] | N
     return None if found is None else values | found
 
 
-def roused(problem: Problem, values: Mapping[str, float]) -> dict[str, float]:
+def roused(problem: Problem, values: Mapping[str, float], told: frozenset[str] = frozenset()) -> dict[str, float]:
     """Values with each series whose shares are all zero begun at the time that promises most, by the term next to it.
 
-    Series that would not help stay as they are.
+    Series that would not help, have priors or are `told` (their parameters are among these) stay as they are.
     """
     values = dict(values)
     for series in terms(problem, several=1):
-        if any(values[share] != 0 for share, _ in series) or any(p in problem.priors for pair in series for p in pair):
+        paths = {path for pair in series for path in pair}
+        if any(values[share] != 0 for share, _ in series) or paths & {*told, *problem.priors}:
             continue
-        found = _promising(problem, values, *series[0], {path for pair in series for path in pair})
+        found = _promising(problem, values, *series[0], paths)
         if found is not None:
             step, t = (found[path] for path in series[0])
             share, time = min(series, key=lambda pair: abs(np.log(values[pair[1]] / t)))

@@ -127,7 +127,8 @@ def fit(
 
     Args:
         problem: predictor, free parameters, noise, bounds, priors.
-        start: values to begin with, taken as they are; None solves for the moduli first.
+        start: values to begin with, taken as they are; None solves for the moduli first. Where it says nothing of a
+            relaxation's share and time, they begin where they promise most.
         search: method, number of starts and steps.
         holdout: recordings of the sample, outside the problem, to predict and score.
         on_accept: called with evaluations, chi-square and values after every accepted step.
@@ -142,8 +143,7 @@ def fit(
     if start is None and not separable(problem):
         first = fitted_moduli(problem, first)
     bare = first
-    if start is None:
-        first = roused(problem, first)
+    first = roused(problem, first, told=frozenset(start or ()))
     tries = [first, *variations(problem, first, multistart - 1, search.seed)]
     n, ends = 0, []
     options = {"method": method, "max_steps": max_steps, "on_accept": on_accept}

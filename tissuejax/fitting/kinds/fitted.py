@@ -38,14 +38,16 @@ class Fitted(abc.ABC):
 
     @classmethod
     @abc.abstractmethod
-    def fit(cls, posed: Problem, held: tuple[str, ...], search: Search, named: bool, progress: Progress | None) -> Fit:
+    def fit(
+        cls, posed: Problem, held: tuple[str, ...], search: Search, named: frozenset[str], progress: Progress | None
+    ) -> Fit:
         """The fit.
 
         Args:
             posed: predictor, free parameters, start.
             held: recordings that are only predicted.
             search: method, starts, steps.
-            named: whether the user said where to begin.
+            named: parameters of which the user said where to begin.
             progress: advanced after every accepted step or run.
         """
 
@@ -54,7 +56,9 @@ class Quick(Fitted):
     """Kinds whose predictions are cheap beside a step: several starts, many steps."""
 
     @classmethod
-    def fit(cls, posed: Problem, held: tuple[str, ...], search: Search, named: bool, progress: Progress | None) -> Fit:
+    def fit(
+        cls, posed: Problem, held: tuple[str, ...], search: Search, named: frozenset[str], progress: Progress | None
+    ) -> Fit:
         """See `Fitted.fit`."""
         if search.method == STRESS_CURVE:
             return fit_stress_curve(posed, holdout=held)  # says what it takes
@@ -62,7 +66,7 @@ class Quick(Fitted):
         with (progress or Silent()).stage(label, None) as stage:
             return fit(
                 posed,
-                start=dict(posed.start) if named else None,
+                start={path: posed.start[path] for path in named} or None,
                 search=search,
                 holdout=held,
                 on_accept=lambda n, chi2, values: stage.advance(note=f"chi-square {chi2:.4g}"),

@@ -38,7 +38,9 @@ class Probings(Fitted):
         return first(posed, store.read(file), given)
 
     @classmethod
-    def fit(cls, posed: Problem, held: tuple[str, ...], search: Search, named: bool, progress: Progress | None) -> Fit:
+    def fit(
+        cls, posed: Problem, held: tuple[str, ...], search: Search, named: frozenset[str], progress: Progress | None
+    ) -> Fit:
         """See `Fitted.fit`."""
         label = f"fitting {posed.predictor.model.energy.name} to {posed.predictor.sample.name}"
         with (progress or Silent()).stage(label, None):
