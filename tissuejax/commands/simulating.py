@@ -158,10 +158,11 @@ def simulated(
     peaks = {n: _peaks(r) for n, r in recorded.items()}
     lines = [f"{n}: " + ", ".join(f"{c} to {v:.4g} {u}" for c, (v, u) in p.items()) for n, p in peaks.items()]
     errors = _errors(sample.recordings, predicted) if measured else {}
+    wide = 2 + max(len(k) for k in (*errors, *files))
     for key, s in errors.items():
         scale, unit = display(s.unit, s.rmse)
-        lines.append(f"  {key:<24}RMSE {f'{s.rmse / scale:.3g} {unit}':<12}R2 {s.r2:.4f}")
-    lines += [f"  ! {note}" for note in notes] + [f"{k:<24} {p}" for k, p in files.items()]
+        lines.append(f"  {key:<{wide}}RMSE {f'{s.rmse / scale:.3g} {unit}':<12}R2 {s.r2:.4f}")
+    lines += [f"  ! {note}" for note in notes] + [f"{k:<{wide}} {p}" for k, p in files.items()]
     record = {"recordings": peaks, "notes": notes, "files": {k: str(p) for k, p in files.items()}}
     record |= {"errors": {k: {"rmse": s.rmse, "unit": s.unit, "r2": s.r2} for k, s in errors.items()}} if errors else {}
     return Reply(record, "\n".join(lines))

@@ -129,16 +129,24 @@ class CuttingPredictor(Predictor):
         Raises:
             UnstableSimulation: a run broke down.
         """
-        out = {}
-        for name in self.names:
-            force, ran = _compiled(self, name, local(self.model, values, name))
-            self._refuse_failed(name, ran)
-            out[name] = self._reported(name, force)
-        return out
+        return self.simulated(values)[0]
 
     def run(self, values: Values) -> dict[str, Ran]:
         """The simulations behind `predict`, with their checks."""
         return {name: _compiled(self, name, local(self.model, values, name))[1] for name in self.names}
+
+    def simulated(self, values: Values) -> tuple[dict[str, Recording], dict[str, Ran | None]]:
+        """Prediction and the simulations behind it.
+
+        Raises:
+            UnstableSimulation: a run broke down (not of a lenient predictor).
+        """
+        out, runs = {}, {}
+        for name in self.names:
+            force, runs[name] = _compiled(self, name, local(self.model, values, name))
+            self._refuse_failed(name, runs[name])
+            out[name] = self._reported(name, force)
+        return out, runs
 
     def jacobian(self, values: Values, paths: Sequence[str]) -> tuple[dict[str, Recording], Tangents]:
         """See `Predictor.jacobian`."""

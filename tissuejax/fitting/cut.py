@@ -28,6 +28,7 @@ from tissuejax.experiments.cutting_record import FORCE, Path, drawn
 from tissuejax.experiments.cutting_run import CuttingSettings, element_size
 from tissuejax.experiments.predictor import predictor
 from tissuejax.fitting.cut_balance import by_balance, linear
+from tissuejax.fitting.cut_meshes import COARSER, FINER, on_one_mesh, on_two_meshes
 from tissuejax.fitting.cut_resolution import plane_modulus, refuse_joules
 from tissuejax.fitting.cut_result import ENERGY, FRICTION, OPEN, STRENGTH, CutFit, described, misfit_said
 from tissuejax.fitting.least_squares import descend
@@ -37,7 +38,6 @@ from tissuejax.model import Model
 from tissuejax.parameters import checked, under
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
-COARSER = 1.5
 SLICES = 12
 SETTLED, FAR = 1e-3, 1e-2  # relative decrease of the misfit at which a descent ends: the last, the others
 SAME = 1.3  # a slice made for a strength serves up to this ratio
@@ -82,7 +82,8 @@ def fit_cut(
             strength by which faces part at half the blade's thickness. The descent begins with the best of them,
             and goes on to the next where it ends in no description of the record.
         names: recordings; all cuts by default.
-        by: "simulation", or "balance" (no strength). numerical: add the step between two meshes to the errors.
+        by: "simulation", or "balance" (no strength). numerical: go on on a finer mesh, and add the step between the
+            two to the errors.
 
     Raises:
         InputError: no cuts, values out of their range (an energy in J), or nothing known of the tissue: toughness
@@ -133,33 +134,34 @@ def fit_cut(
         if described(2 * best[1].cost / posed.n_samples, posed):
             break
     posed, ended, settled = best
-    values = posed.values(ended.y)
+    values, declared = posed.values(ended.y), posed.predictor.model.parameters
     if not np.isfinite(ended.cost):
         raise UnstableSimulation(
             f"no simulated cut of strength {values[STRENGTH]:.3g} Pa or more ran through: an element inverts at the "
             "entry. Take larger elements (--h), start from a lower strength (--start cohesion.strength=...), or leave "
             "the simulation (--by balance)"
         )
-    predicted, _, ran = posed.predictor.linearised(values, free)
-    r, J = posed.linearised(values)
-    declared = posed.predictor.model.parameters
+    if numerical:
+        others = (replace(settings, h=k * max(sizes.values())) for k in (FINER, COARSER))
+        meshes = (predictor(plain, seen, names, settings=other, start=values, **options) for other in others)
+        found = on_two_meshes(posed, values, *meshes)
+    else:
+        found = on_one_mesh(posed, values)
+    values, r, at, shift = found.values, found.residuals, found.predictor, found.shift
+    _, J = posed.linearised(values)
     widening = max(1.0, float(np.sqrt(r @ r / max(1, len(r) - len(free)))))
     scale = np.array([declared[p].typical for p in free])
-    spread = uncertainty(J, ended.y, scale, free, tuple(declared[p].unit for p in free), widening)
-    shift = dict.fromkeys(free, 0.0)
-    if numerical:
-        coarse = replace(settings, h=max(sizes.values()) * COARSER)
-        other = replace(posed, predictor=predictor(plain, seen, names, settings=coarse, start=values, **options))
-        step = np.linalg.lstsq(J, r - other.residuals(values), rcond=None)[0]
-        shift = dict(zip(free, np.abs(step).tolist(), strict=True))
+    spread = uncertainty(J, posed.vector(values), scale, free, tuple(declared[p].unit for p in free), widening)
     std = {p: float(np.hypot(s, shift[p])) for p, s in zip(free, spread.std, strict=True)}
     at_bound = dict(zip(free, posed.box.at_bound(ended.y), strict=True))
-    why = _unidentified(posed.predictor, values, std, free, at_bound)
+    why = _unidentified(at, values, std, free, at_bound)
     status = "converged" if settled else ended.reason if not ended.converged else "slice and estimate do not settle"
-    worst = max(float(x.imbalance) for x in ran.values())
+    worst = max(float(x.imbalance) for x in found.ran.values())
     chi2 = float(r @ r / len(r))
     said = (*misfit_said(chi2, posed), *_unresolved(plain, values, thickness, max(sizes.values()), free, why))
-    return CutFit(values, std, shift, why, chi2, status, runs, by, posed.predictor, predicted, worst, said)
+    if numerical and not found.finer:
+        said += ("elements of half the size did not run through, so these are the values of the fit's own elements",)
+    return CutFit(values, std, shift, why, chi2, status, runs, by, at, found.predicted, worst, said)
 
 
 def _rounds(made, free, values, max_steps) -> tuple[Problem, Ended, bool, int]:
