@@ -293,15 +293,18 @@ OTHER = {"cohesion.strength": 2200.0, "cohesion.energy": 1.5, "effects.blade-fri
 
 def recovery() -> dict:
     """Strength, toughness and friction from 50 % off in both directions and mixed, 3 % noise, a record from a mesh
-    twice as fine; a second draw of the noise; a second truth; then the first behind a notch as long as the entry."""
-    todo = [(f, 3, None, {}) for f in CORNERS]
-    todo += [((0.5, 1.5, 0.5), 4, None, {}), ((0.5, 0.5, 1.5), 5, None, OTHER), ((1.5, 1.5, 1.5), 3, 6e-3, {})]
+    twice as fine as that of the descent, which is the mesh of the steps after it; a second draw of the noise; records
+    of two meshes that are neither; a second truth; then the first behind a notch as long as the entry."""
+    todo = [(f, 3, None, {}, 5e-4) for f in CORNERS]
+    todo += [((0.5, 1.5, 0.5), 4, None, {}, 5e-4), ((0.5, 0.5, 0.5), 3, None, {}, 4.2e-4)]
+    todo += [((0.5, 0.5, 0.5), 3, None, {}, 6.2e-4), ((0.5, 0.5, 1.5), 5, None, OTHER, 5e-4)]
+    todo += [((1.5, 1.5, 1.5), 3, 6e-3, {}, 5e-4)]
     return {"runs": [recovered(*which) for which in todo]}
 
 
-def recovered(off, seed, notch, other) -> dict:
+def recovered(off, seed, notch, other, h) -> dict:
     """One of them: factors on strength, toughness and friction at the start, seed of the noise, length of the notch,
-    what differs in the truth."""
+    what differs in the truth, element of the record (m)."""
     from tests.cutting.records import TRUTH, model, simulated
     from tissuejax.fitting.cut import fit_cut
     from tissuejax.fitting.cut_result import ENERGY, FRICTION, STRENGTH
@@ -309,13 +312,13 @@ def recovered(off, seed, notch, other) -> dict:
     truth = TRUTH | other
     known = {k: v for k, v in truth.items() if k.startswith(("energy", "volumetric"))}
     paths = {"strength": STRENGTH, "energy": ENERGY, "friction": FRICTION}
-    record = simulated(5e-4, 0.03, seed=seed, notch=notch, truth=other)
+    record = simulated(h, 0.03, seed=seed, notch=notch, truth=other)
     begun, cpu = time.perf_counter(), time.process_time()
     start = {p: f * truth[p] for p, f in zip(paths.values(), off, strict=True)}
     found = fit_cut(record, model(), known, start)
     signs = " ".join(f"{q} {100 * (f - 1):+.0f} %" for q, f in zip(paths, off, strict=True))
     out = {
-        "what": "entry left out" if notch else "entry included", "start": signs, "noise": seed,
+        "what": "entry left out" if notch else "entry included", "start": signs, "noise": seed, "record_h_mm": 1e3 * h,
         "truth": [truth[p] for p in paths.values()], "status": found.status, "warnings": " ".join(found.warnings),
         "runs_of_the_model": found.runs, "chi2_per_sample": found.chi2_per_sample,
         "wall_s": time.perf_counter() - begun, "cpu_s": time.process_time() - cpu,

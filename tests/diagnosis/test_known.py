@@ -1,5 +1,7 @@
 """Known physics told to a diagnosis: it belongs to the base, and is looked for no more."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.known import known_physics
 from tissuejax.energies.catalogue import energy
 from tissuejax.errors import InputError
+from tissuejax.recordings.files import read
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 OFFSET, QUICK = 40.0, {"effects": ("drift", "slack"), "effort": Effort(most=1, reshaped=(0, 0, 0))}
@@ -67,3 +70,32 @@ def test_what_can_not_be_told_is_answered(said, answer):
 def test_an_unknown_parameter_of_a_known_effect(shifted):
     with pytest.raises(InputError, match="offset"):
         diagnose(shifted, "neo-hookean", known=["drift.ofset=3"], **QUICK)
+
+
+def test_the_stiffness_of_a_cuts_tissue_is_told_and_held():
+    """The cut is another simulator's (data/make_cut.py: friction 0.1, 20 J/m^2, 3 kPa, wave modulus 36 kPa)."""
+    sample = read(Path(__file__).parents[2] / "data/cut.h5")
+    told = ["energy.mu=3 kPa", "volumetric.K=32e3", "blade-friction"]
+    found = diagnose(sample, "neo-hookean", known=told, effects=["dulling"], effort=QUICK["effort"])
+    assert found.energy == "neo-hookean (mu 3000, K 3.2e+04 given) with blade-friction"
+    bench = found.verdict.bench
+    assert {"energy.mu", "volumetric.K"} & set(bench.base) == set()
+    assert (bench.start["energy.mu"], bench.start["volumetric.K"]) == (3000.0, 32e3)
+    values = found.verdict.empty.values
+    assert values["effects.blade-friction.coefficient"] == pytest.approx(0.1, rel=0.03)  # 0.080 beside an assumed one
+    assert values["cohesion.energy"] == pytest.approx(20.0, rel=0.03)
+    assert not any("relative to an assumed one" in w for w in bench.warnings)
+    open_ = diagnose(sample, "neo-hookean", known=["blade-friction"], effects=["dulling"], effort=QUICK["effort"])
+    assert any("--with energy.mu=" in w for w in open_.verdict.bench.warnings)
+
+
+@pytest.mark.parametrize("said", ["energy.mu", "energy.nu=3kPa", "volumetric.K=3 mm"])
+def test_constants_of_a_cuts_tissue_that_say_nothing_are_refused(said):
+    sample = read(Path(__file__).parents[2] / "data/cut.h5")
+    with pytest.raises(InputError, match=r"told for cuts|constant of the tissue|dimension"):
+        diagnose(sample, "neo-hookean", known=[said])
+
+
+def test_constants_of_the_tissue_are_not_told_where_they_are_fitted():
+    with pytest.raises(InputError, match="told for cuts"):
+        known_physics(["energy.mu=3kPa"], "homogeneous")

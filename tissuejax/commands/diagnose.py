@@ -64,7 +64,8 @@ tests and cuts begin anew.
             action="append",
             default=[],
             metavar="EFFECT",
-            help="known physics: gravity, or viscoelasticity.g1=0.3; what is not given is fitted (repeat)",
+            help="known physics: gravity, viscoelasticity.g1=0.3; what is not given is fitted (repeat); of a cut also "
+            "the tissue's constants, energy.mu=3kPa",
         )
         parser.add_argument("--effect", action="append", metavar="NAME", help="try only these effects (repeat)")
         add_out(parser, "out/SAMPLE-diagnosis-ENERGY")
@@ -106,9 +107,9 @@ def diagnosed(found: Diagnosis, written: dict[str, Path]) -> Reply:
     ]
     if found.verdict.chosen:
         lines += ["", f"{found.energy}, alone and with what was missing:"]
-        lines += [
-            f"  {r['path']:<24}{r['before']:>16}{r['after']:>24} {r['unit']}".rstrip() for r in sentences.base(found)
-        ]
+        rows = sentences.base(found)
+        wide = max(24, *(len(r["path"]) + 2 for r in rows))
+        lines += [f"  {r['path']:<{wide}}{r['before']:>16}{r['after']:>24} {r['unit']}".rstrip() for r in rows]
     lines += ["", *judged.sure(found), ""]
     lines += [f"page     {written['page']}", f"numbers  {written['result']}"]
     record = found.as_dict() | {

@@ -4,9 +4,9 @@ A prediction takes microseconds, so the search of material tests serves cuts as 
 parting: at the entry it lets the force set in over a length, which belongs to the base model with the toughness, and
 where the blade rests, turns or comes to the end of an older cut its samples are left out.
 
-The tissue's own modulus is scaled to the size of the force, and wedging follows the volumetric modulus, which is fitted
-with the base: a return stroke or a second pass tells it from toughness. A friction coefficient is relative to that
-modulus (`tissuejax cut fit` with the measured one gives the number).
+The tissue's own modulus is scaled to the size of the force where it is not told, and wedging follows the volumetric
+modulus, which is fitted with the base then: a return stroke or a second pass tells it from toughness. A friction
+coefficient is relative to that modulus.
 """
 
 from collections.abc import Mapping, Sequence
@@ -103,9 +103,6 @@ class CuttingBench(Bench):
             bench._paths = like._paths
         clocks = {s.recording: s.time for s in segments}
         bench.fresh = {n: np.interp(clocks[n], w.time, w.fresh * (w.speed > 0)) for n, w in p.paths_of.items()}
-        bench.warnings.append(
-            "the tissue's modulus is not in a cut: a friction coefficient is relative to an assumed one"
-        )
         return bench
 
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:

@@ -1,7 +1,8 @@
 """Physics that the base model has already: known effects, stated with their values or fitted along with the energy.
 
 What is stated is no candidate any more. A value given is kept; what else the effect's form has is fitted with the base.
-So a model that a diagnosis repaired is diagnosed again, and weight is stated instead of looked for.
+So a model that a diagnosis repaired is diagnosed again, and weight is stated instead of looked for. A cut holds no
+stiffness of its tissue: the constants that another test found are stated likewise ("energy.mu=3 kPa").
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,15 +10,17 @@ from collections.abc import Mapping, Sequence
 from tissuejax.diagnosis.bench import Bench, Candidate
 from tissuejax.effects.catalogue import effects
 from tissuejax.errors import InputError, unknown
+from tissuejax.units import quantity
 
-Known = dict[str, dict[str, float]]  # by effect, the parameters whose values are given
+Known = dict[str, dict[str, float]]  # by effect (or room of the tissue's constants), the parameters that are given
+TISSUE = ("energy", "volumetric")  # rooms of constants
 
 
 def known_physics(given: Sequence[str], kind: str) -> Known:
     """What was stated, by effect.
 
     Args:
-        given: "NAME" or "NAME.PARAMETER=VALUE" each.
+        given: "NAME" or "NAME.PARAMETER=VALUE" each, numbers in SI or with their unit.
         kind: of the experiments.
 
     Raises:
@@ -27,17 +30,34 @@ def known_physics(given: Sequence[str], kind: str) -> Known:
     for item in given:
         path, _, text = item.removeprefix("effects.").partition("=")
         name, _, parameter = path.partition(".")
-        if name not in effects(kind):
+        if name in TISSUE:
+            if kind != "cutting" or not parameter or not text:
+                raise InputError(
+                    f"{item!r}: the tissue's own constants are told for cuts, as energy.mu=3kPa; where stress or a "
+                    "probe's force was recorded, a diagnosis fits them"
+                )
+        elif name not in effects(kind):
             raise unknown("effect", name, sorted(effects(kind)))
         values = found.setdefault(name, {})
-        if not parameter and not text:
+        if parameter or text:
+            values[parameter] = _number(item, name, parameter, text)
+        else:
             values |= effects(kind)[name].standard
-            continue
-        try:
-            values[parameter] = float(text)
-        except ValueError as error:
-            raise InputError(f"{item!r}: expected NAME, or NAME.PARAMETER=NUMBER in SI units") from error
     return found
+
+
+def _number(item: str, name: str, parameter: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        units = {} if name in TISSUE else {d.name: d.unit for d in effects()[name]().parameters}
+        unit = units.get(parameter, "Pa" if name in TISSUE else "1")
+    try:
+        return quantity(text, unit, item.partition("=")[0])
+    except InputError as error:
+        raise InputError(
+            f"{item!r}: expected NAME, or NAME.PARAMETER=NUMBER in SI units or with one ({error})"
+        ) from None
 
 
 def tell(bench: Bench, known: Known) -> None:
@@ -46,7 +66,15 @@ def tell(bench: Bench, known: Known) -> None:
     Raises:
         InputError: an unknown parameter of a known effect.
     """
-    for name, values in known.items():
+    for name in TISSUE:
+        given = {f"{name}.{p}": v for p, v in known.get(name, {}).items()}
+        for path in given:
+            if path not in bench.start:
+                raise unknown("constant of the tissue", path, [p for p in bench.start if p.startswith(TISSUE)])
+        bench.known |= given
+        bench.start |= given
+        bench.base = tuple(p for p in bench.base if p not in given)
+    for name, values in effects_of(known).items():
         forms = [c for c in bench.candidates.values() if c.name == name]
         given = {f"effects.{name}.{p}": v for p, v in values.items()}
         declared = {d.name for d in effects()[name]().parameters}
@@ -71,6 +99,13 @@ def _form(forms: Sequence[Candidate], given: Mapping[str, float]) -> Candidate |
     return next((c for c in forms if c.nominated), None) if not given else None
 
 
+def effects_of(known: Known) -> Known:
+    """The effects among known physics, without the tissue's constants."""
+    return {name: values for name, values in known.items() if name not in TISSUE}
+
+
 def label(energy: str, known: Known) -> str:
-    """The base model in words: "reduced-polynomial-2 with gravity"."""
-    return f"{energy} with {' and '.join(known)}" if known else energy
+    """The base model in words: "reduced-polynomial-2 with gravity", "neo-hookean (mu 3000 Pa) with settling"."""
+    told = ", ".join(f"{p} {v:.4g}" for name in TISSUE for p, v in known.get(name, {}).items())
+    more = " and ".join(effects_of(known))
+    return energy + f" ({told} given)" * bool(told) + f" with {more}" * bool(more)

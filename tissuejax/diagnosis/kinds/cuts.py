@@ -12,6 +12,11 @@ from tissuejax.diagnosis.known import tell
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.estimation.discrepancy import Discrepancy
 
+ASSUMED = (
+    "the tissue's stiffness is not in a cut: friction and toughness are relative to an assumed one, and their errors "
+    "hold nothing of it. What another test found can be told: --with energy.{}=... --with volumetric.K=..."
+)
+
 
 class Cuts(Recorded):
     """See `Recorded`."""
@@ -26,7 +31,9 @@ class Cuts(Recorded):
         shown = CuttingBench.of(q.sample, q.energy, q.fitted, q.held_out, q.tried, whole)
         for bench in (shown, whole):
             tell(bench, q.known)
-        return cls(question, shown, whole)
+        told = {*q.known.get("energy", ()), *q.known.get("volumetric", ())}
+        moduli = {d.name for d in q.energy.parameters if d.unit == "Pa"}
+        return cls(question, shown, whole, remarks=[] if moduli <= told else [ASSUMED.format(sorted(moduli - told)[0])])
 
     def left(self) -> tuple[Blocks, Discrepancy]:
         """See `Recorded.left`."""

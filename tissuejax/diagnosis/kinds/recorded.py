@@ -10,7 +10,7 @@ from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.judgement.answer import Answered
 from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.judgement.explore import Effort
-from tissuejax.diagnosis.known import Known
+from tissuejax.diagnosis.known import Known, effects_of
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.energies.energy import Energy
 from tissuejax.estimation.discrepancy import Discrepancy
@@ -47,7 +47,7 @@ class Question:
     @property
     def tried(self) -> tuple[str, ...] | None:
         """Effects that a bench has to hold: those to try, and those that are known."""
-        return None if self.effects is None else (*self.effects, *self.known)
+        return None if self.effects is None else (*self.effects, *effects_of(self.known))
 
 
 @dataclass
