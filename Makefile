@@ -40,8 +40,11 @@ test: lint types docs
 	$(PYTEST) --cov-append --durations=15 $(SHAPED:%=--ignore=%)
 	COVERAGE_FILE=out/.coverage $(BIN)/coverage report --sort=cover | awk 'NR < 18 || /^TOTAL/'
 
+# What it said is kept in tests/slow.json, with date and commit.
 slow: $(STAMP)
-	$(BIN)/python -m pytest -q -m slow
+	mkdir -p out
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -q -m slow \
+	    --junitxml=out/slow.xml; status=$$?; $(BIN)/python tests/slow_record.py out/slow.xml; exit $$status
 
 docs: $(STAMP)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --site-dir out/docs
