@@ -1,7 +1,6 @@
 """`tissuejax cut`: what a blade's force tells of the tissue it parts."""
 
 import argparse
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -9,6 +8,7 @@ import numpy as np
 from tissuejax.cohesion.catalogue import law
 from tissuejax.commands.arguments import number
 from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.outputs import add_out, folder, made
 from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.cutting_run import CuttingSettings
 from tissuejax.fitting.cut import along, fit_cut
@@ -75,9 +75,9 @@ sum. Units can be written ("4 kPa", "0.4 mm"); plain numbers are SI.
         parser.add_argument(
             "--prominence", type=float, default=0.05, help="least peak of a tooth, share of the largest"
         )
-        for name, unit, default in _RESOLVED:
-            parser.add_argument(f"--{name}", metavar=unit, default=default, help=f"{name} (resolve)")
-        parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="where to write (default: out/SAMPLE-cut)")
+        for name, unit, default, meaning in _RESOLVED:
+            parser.add_argument(f"--{name}", metavar="VALUE", default=default, help=f"{meaning}, {unit} (resolve)")
+        add_out(parser, "out/SAMPLE-cut-fit-ENERGY-BY, out/SAMPLE-cut-identify")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Do one of the three."""
@@ -94,20 +94,22 @@ sum. Units can be written ("4 kPa", "0.4 mm"); plain numbers are SI.
             if name not in cuts:
                 raise unknown("cutting recording", name, cuts)
         names = tuple(n for n in cuts if n in given.only or not given.only)
-        out = given.out or Path("out") / f"{sample.name}-cut"
         if given.verb == "identify":
+            out = folder(given.out, "cut-identify", sample.name, force=given.force)
             settings = Settings(given.cutoff, given.filter_order, given.prominence)
             found, without = _all_teeth(sample, names, settings)
             period = {n: mesh_period(s, _length(given.h)) for n, s in found.items()} if given.h else {}
             record = {n: _teeth(s) | {"warning": period.get(n)} for n, s in found.items()}
-            written = write_cut(out, record, found, sample, None)
+            written = write_cut(out, {"made": made("cut-identify", sample.name, ())} | record, found, sample, None)
             text = [line for n, s in found.items() for line in _told_teeth(n, s, period.get(n))] + without
             return Reply(
                 {"identified": record, "without_teeth": without, "files": written},
                 "\n".join([*text, f"page     {written['page']}"]),
             )
-        made = material(given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect)
-        model = Model(made.energy, made.volumetric, made.effects, cohesion=law(given.law))
+        tissue = material(given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect)
+        model = Model(tissue.energy, tissue.volumetric, tissue.effects, cohesion=law(given.law))
+        called = [given.energy, given.by, *given.effect]
+        out = folder(given.out, "cut-fit", sample.name, called, given.force)
         if not any(e.name == "blade-friction" for e in model.effects):
             model = model.with_effects(
                 *material(given.energy, ogden_form=given.ogden_form, effects=["blade-friction"]).effects
@@ -116,21 +118,28 @@ sum. Units can be written ("4 kPa", "0.4 mm"); plain numbers are SI.
         settings = CuttingSettings(h=_length(given.h)) if given.h else CuttingSettings()
         found = fit_cut(sample, model, known, start, names, given.by, settings)
         field = along(found, given.along) if given.along else None
-        record = found.record() | ({} if field is None else {"along": field.tolist()})
+        record = {"made": made("cut-fit", sample.name, called)} | found.record()
+        record |= {} if field is None else {"along": field.tolist()}
         written = write_cut(out, record, {}, sample, found, field)
         text = [*_told_fit(found), f"page     {written['page']}", f"numbers  {written['result']}"]
         return Reply(record | {"files": written}, "\n".join(text), 0 if found.status == "converged" else 3)
 
 
 _RESOLVED = (
-    ("strength", "Pa", None), ("toughness", "J/m^2", None), ("mu", "Pa", None), ("bulk", "Pa", None),
-    ("thickness", "m", None), ("length", "m", "0.03"), ("half", "m", "0.01"), ("density", "kg/m^3", "1000"),
-)  # fmt: skip
+    ("strength", "Pa", None, "strength of the tissue"),
+    ("toughness", "J/m^2", None, "its toughness"),
+    ("mu", "Pa", None, "its shear modulus"),
+    ("bulk", "Pa", None, "its bulk modulus"),
+    ("thickness", "m", None, "thickness of the blade"),
+    ("length", "m", "0.03", "length of the cut"),
+    ("half", "m", "0.01", "half the width of the tissue across the cut"),
+    ("density", "kg/m^3", "1000", "density of the tissue"),
+)
 
 
 def _resolve(given) -> Reply:
     values = {}
-    for name, unit, _ in (*_RESOLVED, ("h", "m", None)):
+    for name, unit, *_ in (*_RESOLVED, ("h", "m")):
         text = getattr(given, name)
         if text is None:
             raise InputError(f"--{name} is needed, in {unit}: see `tissuejax cut --help` for an example")

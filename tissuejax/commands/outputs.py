@@ -20,6 +20,8 @@ RECORDS = {  # the file in which a verb says what it made; those with a page sha
     "sensitivity": "sensitivity.json",
     "profile": "profiles.json",
     "posterior": "posterior.json",
+    "cut-fit": "result.json",
+    "cut-identify": "result.json",
 }
 WITH_A_PAGE = ("result.json", "comparison.json", "campaign.json")
 
