@@ -74,9 +74,6 @@ def summed(felt: Felt) -> Felt:
     return Felt(force, torque, felt.reaction, jnp.sum(felt.work), spent)
 
 
-FEEL = 0.5  # share of a Newton step towards equilibrium that a compliant machine takes in each of the run's steps
-
-
 def machine(scene: Scene) -> Machine:
     """Reference quantities of a scene (pure JAX)."""
     mesh = internal.mesh(scene)
@@ -190,16 +187,16 @@ def _spent(m: Machine, acting: surface.Acting, inner, f, v, pushed) -> Spent:
 def _given_way(m: Machine, force, felt, u, centre, state) -> Float[Array, " 3"]:
     """The force that the machine gives way to in the next step, N.
 
-    In equilibrium it is the contact's own: felt = F(centre + compliance * felt). A part of Newton's step towards that
-    is taken, with the contact's stiffness as it is. A fixed part of the difference instead leaves the loop unstable
-    where compliance times stiffness is large: the blade chatters, and the balance of energies is open by more than
-    the work.
+    In equilibrium it is the contact's own: felt = F(centre + compliance * felt). Newton's step towards that is taken,
+    with the contact's stiffness as it is. A fixed part of the difference instead leaves the loop unstable where
+    compliance times stiffness is large (the blade chatters, and the balance of energies is open by more than the
+    work); half of Newton's step lags like a dashpot, which takes 1.4 % of the work of a blade that rubs.
     """
     compliance = jnp.broadcast_to(m.scene.probe.compliance, 3)
     total = lambda at: jnp.sum(_surface(m, u, at, state.grip, state.opening).force, 1)  # noqa: E731
     stiffness = -jax.jacfwd(total)(centre)
     step = jnp.linalg.solve(jnp.eye(3, dtype=u.dtype) + stiffness * compliance, force - felt)
-    return felt + FEEL * step
+    return felt + step
 
 
 def _surface(m, u, centre, grip, opening) -> surface.Acting:
