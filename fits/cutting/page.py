@@ -9,6 +9,34 @@ from tissuejax.report.page import png, render
 from tissuejax.storage import write_bytes, write_text
 
 
+def _recovered(runs: list[dict]) -> Figure:
+    """Error of every estimate with its standard error; the first record and the one without an entry, as fitted."""
+    figure = Figure(figsize=(10, 5.6), layout="constrained")
+    left, right = figure.subfigures(1, 2, width_ratios=(1.25, 1))
+    whole = [r for r in runs if r["what"] == "entry included"]
+    names = [f"{r['record_h_mm']:.2g} mm, {r['truth'][0]:.0f} Pa\nnoise {r['noise']}, {_signs(r)}" for r in whole]
+    for ax, what in zip(left.subplots(1, 3, sharey=True), ("strength", "energy", "friction"), strict=True):
+        off, std = ([r[f"{what}_{kind}"] for r in whole] for kind in ("percent", "std_percent"))
+        ax.errorbar(off, range(len(whole)), xerr=std, fmt="o", markersize=4, capsize=2, linewidth=1)
+        ax.axvline(0, color="0.6", linewidth=0.8)
+        ax.set(xlabel=f"{what}: error (%)", yticks=range(len(whole)))
+        ax.set_yticklabels(names, fontsize=7)
+    left.axes[0].invert_yaxis()
+    for ax, r in zip(right.subplots(2, 1), (runs[0], runs[-1]), strict=True):
+        at, seen, made = r["record"]
+        ax.plot(at, seen, ".", color="0.4", markersize=6, label="record: means over 1 mm of the way")
+        ax.plot(at, made, linewidth=1.4, label="fitted")
+        ax.set(xlabel="time (s)", ylabel="force (N)")
+        ax.set_title(r["what"], fontsize=9)
+        ax.legend(frameon=False, fontsize=8, loc="upper left")
+    return figure
+
+
+def _signs(run: dict) -> str:
+    """Where a fit began: "- + -" for strength, energy, friction half too low or too high."""
+    return " ".join(word[0] for word in run["start"].split() if word[0] in "+-")
+
+
 def _kept(folder: Path, name: str, caption: str, figure: Figure) -> dict:
     picture = png(figure)
     (folder / "figures").mkdir(exist_ok=True)
@@ -57,22 +85,15 @@ def write(folder: Path, found: dict) -> Path:
     shown = []
     if "recovery" in found:
         runs = found["recovery"]["runs"]
-        figure = Figure(figsize=(8, 2.8 * len(runs)), layout="constrained")
-        for ax, r in zip(np.atleast_1d(figure.subplots(len(runs), 1)), runs, strict=True):
-            at, seen, made = r["record"]
-            ax.plot(
-                at,
-                seen,
-                ".",
-                color="0.5",
-                markersize=3,
-                label="record (mesh twice as fine, noise): means over 1 mm of the way",
+        figure = _recovered(runs)
+        shown += [
+            _kept(
+                folder,
+                "recovery",
+                "Records of finer meshes fitted from 50 % off: errors with their standard errors, and two records.",
+                figure,
             )
-            ax.plot(at, made, linewidth=1.4, label="fitted")
-            ax.set(xlabel="time (s)", ylabel="force (N)")
-            ax.set_title(f"{r['what']}; start: {r['start']}", fontsize=9)
-            ax.legend(frameon=False, fontsize=8)
-        shown += [_kept(folder, "recovery", "A record of a mesh twice as fine, fitted from 50 % off.", figure)]
+        ]
     if any("series" in r for r in found.get("steady", {}).get("runs", [])):
         runs = found["steady"]["runs"]
         curves = [(f"h {r['h_mm']:g} mm", *r["series"]) for r in runs]

@@ -1,6 +1,6 @@
 """Every quantitative result of the source's chapters 2 to 4 beside ours: what can be computed here is, in steps kept.
 
-tissuejax study fits/source          about half an hour on a free core; parts that are in result.json are not run again
+tissuejax study fits/source          about seven minutes; parts that are in result.json are not run again
 """
 
 import json
