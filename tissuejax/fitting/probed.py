@@ -1,9 +1,11 @@
 """Fit of probings: few simulations, a swift descent, a fine end, and errors that include the numerical one.
 
 Where to go is found by runs four times as fast as the one that counts: their own error moves the estimate by a few
-standard errors, their derivatives are right to a per cent. The end (`closing`) are chord steps on the finer mesh with
-the last derivatives. Standard errors hold two parts: noise, and how far the estimate moves when mesh, step and penalty
-are changed (a linear shift: the change of the prediction through the Jacobian).
+standard errors, and their derivatives are right to some per cent, which is enough to go by. The end (`closing`) are
+chord steps on the finer mesh with the last derivatives. Standard errors hold two parts: noise, and how far the estimate
+moves when mesh, step and penalty are changed (a linear shift: the change of the prediction through the Jacobian). Both
+want derivatives at life's pace: where two columns are nearly one (a bulk modulus beside a shear modulus), what rings
+in a swift run tells them apart, and errors come out several times too small.
 """
 
 import time
@@ -120,9 +122,10 @@ def fit_probed(
         kept.keep(problem.values(x), closing=True)
         stage.advance(note="numerical error" if numerical else "the fine simulation")
         seen = changes(problem, problem.values(x), runs.simulated.all, finish, numerical)
-        shifts, sizes = numerical_shifts(problem, seen.left, J)
         stage.advance(note="finer mesh" if finish else "last steps")
         problem, x, r, left = close(problem, x, J, seen, runs.simulated, finish, holdout, runs.better, runs.closer)
+        J = runs.exact(x)
+        shifts, sizes = numerical_shifts(problem, seen.left, J)
         cost = 0.5 * float(r @ r)
         final, values = problem.predictor, problem.values(x)
         before, after = kept.before, vector_errors(problem, r)
@@ -214,6 +217,12 @@ class Runs(LeastSquares):
         self.stage.advance(note="derivatives")
         self.jacobians += 1
         return self.coarse.linearised(self.problem.values(x))[1]
+
+    def exact(self, x: Float[np.ndarray, " p"]) -> Float[np.ndarray, "n p"]:
+        """Jacobian to the parameters themselves at the pace that counts, for what is said of the estimate."""
+        self.stage.advance(note="standard errors")
+        self.jacobians += 1
+        return self.problem.linearised(self.problem.values(x))[1]
 
     def accepted(self, n: int, cost: float, y: Float[np.ndarray, " p"]) -> None:
         """Keep an accepted step and show it."""
