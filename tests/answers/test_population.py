@@ -121,7 +121,10 @@ def test_mean_and_spreads_are_found_again_and_specimens_shrink(rng):
     assert (np.mean((shrunken - theta) ** 2, 0) < np.mean((x - theta) ** 2, 0)).all()
     assert (std < np.sqrt(np.einsum("nii->ni", S)) * 1.02).all()
     new = np.log(found.new()[:, 0])
-    assert np.std(new) == pytest.approx(np.hypot(0.2, 0.3), rel=0.6)
+    n = len(set(of.group))
+    means = [theta[k::n, 0].mean() for k in range(n)]
+    spread = np.std(means, ddof=1) * np.sqrt((1 + 1 / n) * (n - 1) / (n - 3))  # Student's, for a new one of n
+    assert np.std(new) == pytest.approx(np.hypot(0.2, spread), rel=0.25)
     known = np.log(found.new("g0")[:, 0])
     assert np.std(known) < np.std(new)
 

@@ -77,9 +77,9 @@ def test_states_of_a_probing_can_be_opened_and_pictured(tmp_path, capsys):
     z = 0.015 + 0.008 + np.interp(t, [0, 0.2, 1.0, 1.6, 2.2, 2.4], [5e-4, 5e-4, -3e-3, -3e-3, 1e-3, 1e-3])
     np.savetxt(tmp_path / "path.csv", np.stack([t, 0 * t, 0 * t, z], 1), delimiter=",", header="t,x,y,z", comments="")
     what = ["--body", str(tmp_path / "probe.h5"), "--path", str(tmp_path / "path.csv"), "--radius", "8 mm"]
-    how = ["--states", "--mesh", "file", "--compression", "20", "-o", str(tmp_path / "out"), "--json"]
+    how = ["--states", "--compression", "10", "-o", str(tmp_path / "out"), "--json"]
     assert main(["simulate", "-e", "neo-hookean", "--set", "energy.mu=1 kPa", *what, *how]) == 0
     files = json.loads(capsys.readouterr().out)["files"]
     deepest = min(meshio.read(p).point_data["displacement"][:, 2].min() for p in (tmp_path / "out").glob("*.vtu"))
-    assert deepest == pytest.approx(-3e-3, rel=0.15)  # contact is a penalty, the mesh coarse
+    assert deepest == pytest.approx(-3e-3, rel=0.05)  # between points of contact a node lies a little deeper
     assert ("probing picture" in files) == (find_spec("pyvista") is not None)

@@ -87,7 +87,7 @@ def probing_proposals(
     except InputError:  # a varied path that the body doesn't allow must not cost the verdict
         return []
     segments, y, sigma = series(planned, ready)
-    runs = Runs({FINE: ready}, bench.runs.effects, segments, y, kept_samples(planned, segments))
+    runs = Runs({FINE: ready, COARSE: ready}, bench.runs.effects, segments, y, kept_samples(planned, segments))
     predicted = runs.many([(bench.at(shared(r)), names, FINE) for r in (chosen, rival)])
     keys = [", ".join(dict.fromkeys(bench.candidates[k].name for k in r.keys)) for r in (chosen, rival)]
     out = []
