@@ -76,3 +76,9 @@ def test_where_the_finer_mesh_breaks_down_the_coarser_says_how_far_meshes_are_ap
     alone = on_one_mesh(posed, estimate(1.0))
     assert alone.shift == dict.fromkeys(PATHS, 0.0)
     assert replace(alone, shift=found.shift).predictor is posed.predictor
+
+
+def test_where_no_other_mesh_runs_the_error_is_not_known():
+    found = on_two_meshes(Posed(Mesh(1.0)), estimate(1.0), Mesh(0.5, breaks=True), Mesh(1.5, breaks=True))
+    assert found.values == estimate(1.0)
+    assert set(found.shift.values()) == {np.inf}

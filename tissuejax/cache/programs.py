@@ -53,6 +53,10 @@ def keep_programs() -> None:
     jax.config.update("jax_persistent_cache_min_compile_time_secs", WORTHWHILE)
 
 
+ANOTHERS, OPEN_TO_ALL = "belongs to another user", "may be written by others"
+ADVICE = {ANOTHERS: "", OPEN_TO_ALL: "`chmod go-w` it, or "}
+
+
 def own(where: Path) -> bool:
     """Whether a folder is this user's and nobody else may write there; says so once where it isn't.
 
@@ -61,8 +65,8 @@ def own(where: Path) -> bool:
     whose = strangers(where)
     if whose:
         warnings.warn(
-            f"{where} {whose}, so no compiled programs are kept or taken there: `chmod go-w` it, or name another "
-            f"folder in {ENVIRONMENT}",
+            f"{where} {whose}, so no compiled programs are kept or taken there: {ADVICE[whose]}name another folder in "
+            f"{ENVIRONMENT}",
             stacklevel=3,
         )
     return not whose
@@ -74,8 +78,8 @@ def strangers(where: Path) -> str:
         return ""
     seen = where.stat()
     if seen.st_uid != os.getuid():
-        return "belongs to another user"
-    return "may be written by others" if seen.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else ""
+        return ANOTHERS
+    return OPEN_TO_ALL if seen.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else ""
 
 
 def forget_programs() -> None:

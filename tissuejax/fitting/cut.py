@@ -155,6 +155,8 @@ def fit_cut(
     std = {p: float(np.hypot(s, shift[p])) for p, s in zip(free, spread.std, strict=True)}
     at_bound = dict(zip(free, posed.box.at_bound(ended.y), strict=True))
     why = _unidentified(at, values, std, free, at_bound)
+    if not np.isfinite(list(shift.values())).all():
+        why |= dict.fromkeys(free, "elements of no other size ran through, so what the mesh does to it is not known")
     status = "converged" if settled else ended.reason if not ended.converged else "slice and estimate do not settle"
     worst = max(float(x.imbalance) for x in found.ran.values())
     chi2 = float(r @ r / len(r))

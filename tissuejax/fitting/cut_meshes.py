@@ -31,7 +31,7 @@ class Meshes:
 
     Attributes:
         values: the estimate, on the finer mesh where that could be run.
-        shift: by path, the change from the fit's mesh to the other one.
+        shift: by path, the change from the fit's mesh to the other one; infinite where no other could be run.
         residuals: there, over the noise.
         predicted, ran: the recordings there, and the simulations behind them.
         predictor: the mesh of the estimate.
@@ -67,7 +67,8 @@ def on_two_meshes(
     else:
         return replace(found, shift={p: abs(at[p] - values[p]) for p in posed.free}, finer=True)
     found = _at(posed, posed.predictor, values)
-    step = _step(jacobian, found.residuals - replace(posed, predictor=coarser).residuals(values))
+    apart = found.residuals - replace(posed, predictor=coarser).residuals(values)
+    step = _step(jacobian, apart) if np.isfinite(apart).all() else np.full(len(posed.free), np.inf)
     return replace(found, shift=dict(zip(posed.free, np.abs(step).tolist(), strict=True)))
 
 

@@ -53,7 +53,7 @@ def compiled(name: str, shared: bool = False) -> Path:
     target = folder() / f"{Path(name).stem}-{key}{'.so' if shared else ''}"
     if whose := strangers(target.parent):
         raise InputError(
-            f"{target.parent} {whose}, and programs are run from there: `chmod go-w` it, or name another folder in "
+            f"{target.parent} {whose}, and programs are run from there: {ADVICE[whose]}name another folder in "
             f"{ENVIRONMENT}"
         )
     if target.is_file():
