@@ -8,7 +8,7 @@ import tempfile
 from importlib.resources import files
 from pathlib import Path
 
-from tissuejax.cache.programs import ENVIRONMENT, strangers
+from tissuejax.cache.programs import ADVICE, ENVIRONMENT, strangers
 from tissuejax.errors import InputError
 
 FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-Wall", "-Wextra")
