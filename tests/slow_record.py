@@ -30,7 +30,7 @@ def record(xml: Path) -> dict:
     ends = {name: said(case) for name, case in names.items()}
     by_time = sorted(names, key=lambda name: -float(names[name].get("time", 0)))
     git = ["git", "-C", str(HERE), "rev-parse", "--short=7", "HEAD"]
-    changed = ["git", "-C", str(HERE), "status", "--porcelain", "--", "../tissuejax", "."]
+    changed = ["git", "-C", str(HERE), "status", "--porcelain", "--", "../tissuejax", ".", ":!slow.json"]
     commit = subprocess.run(git, capture_output=True, text=True).stdout.strip()
     dirty = "-dirty" * bool(subprocess.run(changed, capture_output=True, text=True).stdout.strip())
     return {
