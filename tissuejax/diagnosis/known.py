@@ -105,7 +105,7 @@ def effects_of(known: Known) -> Known:
 
 
 def label(energy: str, known: Known) -> str:
-    """The base model in words: "reduced-polynomial-2 with gravity", "neo-hookean (mu 3000 Pa) with settling"."""
+    """The base model in words: "reduced-polynomial-2 with gravity", "neo-hookean (mu 3000 given) with settling"."""
     told = ", ".join(f"{p} {v:.4g}" for name in TISSUE for p, v in known.get(name, {}).items())
     more = " and ".join(effects_of(known))
     return energy + f" ({told} given)" * bool(told) + f" with {more}" * bool(more)

@@ -20,8 +20,8 @@ TIMES = 9  # at which a share is scored
 WAKING = (0.01, 0.3)  # least and greatest share with which a term is woken
 
 
-def terms(problem: Problem, several: int = 2) -> list[list[tuple[str, str]]]:
-    """(share, time) of all terms of each effect that has `several` of them, both free in the fit."""
+def terms(problem: Problem, least: int = 2) -> list[list[tuple[str, str]]]:
+    """(share, time) of all terms of each effect that has at `least` so many of them, both free in the fit."""
     found = []
     for effect in problem.predictor.model.effects:
         pairs = [
@@ -29,7 +29,7 @@ def terms(problem: Problem, several: int = 2) -> list[list[tuple[str, str]]]:
             for share, time in zip(getattr(effect, "shares", ()), getattr(effect, "times", ()))
         ]
         free = [pair for pair in pairs if set(pair) <= set(problem.free)]
-        if len(free) >= several:
+        if len(free) >= least:
             found.append(free)
     return found
 
@@ -64,7 +64,7 @@ def roused(problem: Problem, values: Mapping[str, float], told: frozenset[str] =
     Series that would not help, have priors or are `told` (their parameters are among these) stay as they are.
     """
     values = dict(values)
-    for series in terms(problem, several=1):
+    for series in terms(problem, least=1):
         paths = {path for pair in series for path in pair}
         if any(values[share] != 0 for share, _ in series) or paths & {*told, *problem.priors}:
             continue
