@@ -8,6 +8,7 @@ from tests.cutting.records import VALUES, model, record, sample, strokes
 from tissuejax.effects.catalogue import effect, effects
 from tissuejax.effects.effect import Effect
 from tissuejax.errors import InputError
+from tissuejax.experiments.cutting_record import path_of, steady
 from tissuejax.experiments.predictor import predictor
 from tissuejax.recordings.files import read
 from tissuejax.recordings.hdf5_writing import write
@@ -46,6 +47,17 @@ def test_steady_cut_return_and_second_pass():
     assert at[back] == pytest.approx(0.01 * (wedge * coming - rub * X[back]), rel=1e-3)
     assert at[again] == pytest.approx(0.01 * (wedge * going + rub * X[again]), rel=1e-3)
     assert at[0] == 0
+
+
+def test_a_sample_at_a_turn_is_of_neither_stroke():
+    """Its friction has one sign or the other; before it a cut is steady to the last, after it not at once."""
+    path = path_of(SAMPLE.recordings["there and back"], SAMPLE.geometry)
+    counts = steady(path, TIME)
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(X)))) + 1
+    assert len(turns) == 2
+    assert not counts[turns].any()
+    assert counts[turns[0] - 2]  # between two samples of a stroke a force is that of the stroke
+    assert not counts[turns[0] + 1]
 
 
 @pytest.mark.parametrize("name", OWN)

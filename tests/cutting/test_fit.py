@@ -1,20 +1,25 @@
 """What a fit of cuts compares and finds: means over blocks of the way, the example, starts that are off."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tests.cutting.records import TRUTH, model, record, sample, simulated, strokes
 from tissuejax.cohesion.catalogue import law
+from tissuejax.effects.catalogue import effect
 from tissuejax.energies.neo_hookean import NeoHookean
 from tissuejax.energies.volumetric import Quadratic
 from tissuejax.errors import InputError
 from tissuejax.experiments.cutting_blocks import blocks
 from tissuejax.experiments.cutting_record import path_of
-from tissuejax.fitting.cut import fit_cut
+from tissuejax.fitting.checkpoint import Checkpoint
+from tissuejax.fitting.cut import fit_cut, too_coarse
 from tissuejax.fitting.cut_result import ENERGY, FRICTION, STRENGTH
+from tissuejax.fitting.cut_search import End, Search
 from tissuejax.model import Model
+from tissuejax.progress import Silent
 from tissuejax.recordings.files import read
 
 EXAMPLE = Path(__file__).parents[2] / "data" / "cut.h5"
@@ -55,6 +60,46 @@ def test_the_example_is_recovered_by_the_balance():
     assert STRENGTH in found.unidentified
     assert not found.warnings
     assert len(found.predicted["there-back-again"].channels["cutting_force"].values) == 481
+
+
+def test_a_blade_too_thin_for_its_elements_is_fitted_by_the_balance():
+    """Half a millimetre of blade, elements of a quarter: 78 kPa part the tissue, of which they resolve a tenth."""
+    made = Model(NeoHookean(), Quadratic(), (), cohesion=law("bilinear"))
+    known = {"energy.mu": 3000.0, "volumetric.K": 32e3}
+    found = fit_cut(read(EXAMPLE), made, known, names=("there-back-again",), by="either")
+    assert found.by == "balance"
+    assert "do not resolve" in found.unidentified[STRENGTH]
+
+
+def test_a_blade_that_elements_resolve_is_no_such_case():
+    model_ = model(effect("blade-friction"))
+    for thickness, h in ((2e-3, 1e-3), (2e-3, 2e-3)):  # E' G / (2 G / b)^2 is 5.7 mm
+        assert not too_coarse(model_, TRUTH, thickness, h)
+    assert too_coarse(model_, TRUTH, 2e-3, 6e-3)
+
+
+def test_a_stopped_fit_goes_on_from_what_it_kept(tmp_path):
+    """And only from there; another question has another mark, so it begins at its own starts."""
+    begun = []
+
+    class Noted(Search):
+        def _rounds(self, made, values):
+            begun.append(dict(values))
+            posed = SimpleNamespace(n_samples=1, noise=SimpleNamespace(estimated=False))
+            return End(posed, SimpleNamespace(cost=0.1), True)
+
+        def _misfit(self, made, values):
+            return values[ENERGY]
+
+    starts = [{ENERGY: 3.0, STRENGTH: 1.0}, {ENERGY: 2.0, STRENGTH: 1.0}]
+    made = SimpleNamespace(prepared=lambda values: None)
+    with Silent().stage("cutting") as stage:
+        for mark, kept in (("a", None), ("a", {ENERGY: 2.2, STRENGTH: 4.0}), ("b", None)):
+            search = Noted((STRENGTH, ENERGY), 4, Checkpoint(tmp_path / "kept.json", mark, starts[0]), stage)
+            if kept:
+                search._accepted(3, 1.0, kept)
+            search.best(made, starts)
+    assert begun == [starts[1], {ENERGY: 2.2, STRENGTH: 4.0}, starts[1]]
 
 
 @pytest.mark.parametrize("energy", [-2.0, 1.25e-4])

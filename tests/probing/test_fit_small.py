@@ -14,7 +14,7 @@ from tests.probing.bench import BODY, QUICK, VALUES, measured, model, recording,
 from tissuejax.effects.catalogue import suited
 from tissuejax.errors import InputError
 from tissuejax.experiments.predictor import predictor
-from tissuejax.fitting.checkpoint import Checkpoint
+from tissuejax.fitting.checkpoint import Checkpoint, mark_of
 from tissuejax.fitting.options import Objective, Unknowns
 from tissuejax.fitting.probed import fit_probed
 from tissuejax.fitting.setup import problem
@@ -104,8 +104,12 @@ def test_what_was_kept_of_another_question_is_not_taken(tmp_path):
         unknowns = Unknowns(start=START, fix=fix, **limits)
         return problem(predictor(model(), given, settings=settings), unknowns, objective)
 
-    Checkpoint(path, asked()).keep({"energy.C10": 555.0})
-    assert Checkpoint(path, asked()).values()["energy.C10"] == 555.0
+    def kept(posed):
+        p = posed.predictor
+        return Checkpoint(path, mark_of(posed, p.settings, p.setups), posed.start)
+
+    kept(asked()).keep({"energy.C10": 555.0})
+    assert kept(asked()).values()["energy.C10"] == 555.0
     others = [
         asked(sample(deeper)),
         asked(sample(wider)),
@@ -118,7 +122,7 @@ def test_what_was_kept_of_another_question_is_not_taken(tmp_path):
         asked(objective=Objective(weights={"force": 0.004, "markers": 6e-5})),
         asked(objective=Objective(loss="cauchy")),
     ]
-    assert [Checkpoint(path, other).values()["energy.C10"] for other in others] == [800.0] * len(others)
+    assert [kept(other).values()["energy.C10"] for other in others] == [800.0] * len(others)
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import numpy as np
 from tissuejax.cohesion.catalogue import law
 from tissuejax.commands.arguments import number
 from tissuejax.commands.command import Command, Reply
-from tissuejax.commands.outputs import add_out, folder, made
+from tissuejax.commands.outputs import KEPT, add_out, folder, made
 from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.cutting_run import CuttingSettings
 from tissuejax.fitting.cut import along, fit_cut
@@ -17,6 +17,7 @@ from tissuejax.fitting.cut_result import FRICTION, CutFit
 from tissuejax.fitting.sawtooth import SECTIONS, Sawtooth, Settings, mesh_period, sawtooth
 from tissuejax.model import Model
 from tissuejax.parameters import Parameter
+from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read
 from tissuejax.recordings.recording import Sample
 from tissuejax.report.cutting import write_cut
@@ -39,7 +40,8 @@ A recording of a blade drawn through tissue goes in; toughness (J/m^2), strength
   tissuejax cut fit cut.h5 --energy neo-hookean --fix "energy.mu=1564" --fix "volumetric.K=20 kPa" --out out/cut
       the whole record, from before contact, by gradients through a simulation: strength from the entry, toughness from
       the mean, friction from the return stroke or a second pass; with intervals, and "not identified" where so.
-      --by balance does without the simulation (seconds, no strength); --along 18 adds toughness along the path
+      --by balance does without the simulation (seconds, no strength), and so does a blade too thin for its elements;
+      --along 18 adds toughness along the path. Stopped, a fit goes on from its last values when given again
   tissuejax cut identify cut.h5
       the source's own way, for comparison: filter, teeth, sections of the edge, strength and energy tooth by tooth
 
@@ -62,7 +64,11 @@ sum. Units can be written ("4 kPa", "0.4 mm"); plain numbers are SI.
         parser.add_argument("--fix", action="append", default=[], metavar="PATH=VALUE", help="what is known (fit)")
         parser.add_argument("--start", action="append", default=[], metavar="PATH=VALUE", help="where to begin (fit)")
         parser.add_argument(
-            "--by", default="simulation", choices=["simulation", "balance"], help="how to predict (fit)"
+            "--by",
+            default="either",
+            choices=["simulation", "balance", "either"],
+            help="how to predict (fit); either: a simulation unless its elements resolve no strength that this blade "
+            "would part",
         )
         parser.add_argument(
             "--along", type=int, default=0, metavar="N", help="toughness along the path, N values (fit)"
@@ -77,7 +83,7 @@ sum. Units can be written ("4 kPa", "0.4 mm"); plain numbers are SI.
         )
         for name, unit, default, meaning in _RESOLVED:
             parser.add_argument(f"--{name}", metavar="VALUE", default=default, help=f"{meaning}, {unit} (resolve)")
-        add_out(parser, "out/SAMPLE-cut-fit-ENERGY-BY, out/SAMPLE-cut-identify")
+        add_out(parser, "out/SAMPLE-cut-fit-ENERGY, out/SAMPLE-cut-identify")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Do one of the three."""
@@ -108,7 +114,7 @@ sum. Units can be written ("4 kPa", "0.4 mm"); plain numbers are SI.
             )
         tissue = material(given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect)
         model = Model(tissue.energy, tissue.volumetric, tissue.effects, cohesion=law(given.law))
-        called = [given.energy, given.by, *given.effect]
+        called = [given.energy, *([given.by] if given.by != "either" else []), *given.effect]
         out = folder(given.out, "cut-fit", sample.name, called, given.force)
         if not any(e.name == "blade-friction" for e in model.effects):
             model = model.with_effects(
@@ -116,7 +122,9 @@ sum. Units can be written ("4 kPa", "0.4 mm"); plain numbers are SI.
             )
         known, start = (_values(x, model.across(names).parameters) for x in (given.fix, given.start))
         settings = CuttingSettings(h=_length(given.h)) if given.h else CuttingSettings()
-        found = fit_cut(sample, model, known, start, names, given.by, settings)
+        found = fit_cut(
+            sample, model, known, start, names, given.by, settings, checkpoint=out / KEPT, progress=for_terminal()
+        )
         field = along(found, given.along) if given.along else None
         record = {"made": made("cut-fit", sample.name, called)} | found.record()
         record |= {} if field is None else {"along": field.tolist()}

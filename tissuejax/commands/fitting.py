@@ -9,7 +9,7 @@ from typing import ClassVar
 from tissuejax import verbs
 from tissuejax.commands.arguments import add_fit, add_model, fit_options
 from tissuejax.commands.command import Command, Reply
-from tissuejax.commands.outputs import add_out, folder, made, refuse_other
+from tissuejax.commands.outputs import KEPT, add_out, folder, made, refuse_other
 from tissuejax.errors import InputError
 from tissuejax.fitting.advice import suspect
 from tissuejax.fitting.first import First
@@ -22,7 +22,6 @@ from tissuejax.report.page import write_fit
 from tissuejax.storage import write_text
 
 SUSPECT = 4  # exit code of a fit whose numbers should not be used as they are
-KEPT = "checkpoint.json"  # the last iterate of a fit of probings, until it has ended
 
 
 class FitCommand(Command):

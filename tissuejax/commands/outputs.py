@@ -23,6 +23,7 @@ RECORDS = {  # the file in which a verb says what it made; those with a page sha
     "cut-fit": "result.json",
     "cut-identify": "result.json",
 }
+KEPT = "checkpoint.json"  # where a fit that simulates stood, until it has ended
 WITH_A_PAGE = ("result.json", "comparison.json", "campaign.json")
 
 

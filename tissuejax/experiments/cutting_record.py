@@ -96,8 +96,8 @@ def path_of(recording: Recording, geometry: Geometry) -> Path:
 
 
 def steady(path: Path, time: Float[np.ndarray, " m"]) -> np.ndarray:
-    """True where a balance of energies has something to say: not within `TURNING` bevels of a turn of the blade, of the
-    end of a cut made before or of the far side of the tissue, nor within one of the entry."""
+    """True where a balance of energies has something to say: not at a turn of the blade nor within `TURNING` bevels
+    after it, of the end of a cut made before or of the far side of the tissue, nor within one of the entry."""
     bevel = 0.5 * path.thickness / np.tan(path.angle / 2)
     step = np.diff(path.x, prepend=path.x[0])
     heading = np.sign(np.where(np.abs(step) > 1e-9, step, 0.0))
@@ -109,7 +109,8 @@ def steady(path: Path, time: Float[np.ndarray, " m"]) -> np.ndarray:
     old = np.maximum.accumulate(np.concatenate([[path.notch], path.front[:-1]]))
     joining = (np.abs(path.x - old) < TURNING * bevel) & np.isfinite(way)
     out = (path.x > path.length - bevel) | (np.abs(path.x) < bevel)
-    calm = (way > TURNING * bevel) & (heading != 0) & ~joining & ~out
+    turn = heading != np.append(heading[1:], heading[-1])  # a sample at a turn belongs to neither stroke
+    calm = (way > TURNING * bevel) & (heading != 0) & ~turn & ~joining & ~out
     return np.interp(time, path.time, calm) > 0.99
 
 

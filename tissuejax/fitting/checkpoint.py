@@ -1,4 +1,4 @@
-"""Where a fit of probings stood when it was stopped."""
+"""Where a fit that simulates stood when it was stopped."""
 
 import json
 from collections.abc import Mapping
@@ -9,30 +9,34 @@ from tissuejax.cache import key
 from tissuejax.estimation.problem import Problem
 
 
+def mark_of(problem: Problem, *about) -> str | None:
+    """A mark of a problem and what else it depends on; None for a law from elsewhere, or code that has moved since it
+    was loaded."""
+    p = problem.predictor
+    fixed = {path: float(value) for path, value in problem.start.items() if path not in problem.free}
+    aims = (problem.free, fixed, problem.noise, problem.bounds, problem.priors, problem.loss, problem.stiffness)
+    return key.key(p.model, p.names, *about, aims, problem.series.y)
+
+
 class Checkpoint:
     """The last accepted values of a fit on disk, with a mark of the problem they belong to."""
 
-    def __init__(self, path: Path | None, problem: Problem):
-        self.path, self.problem = (None if path is None else Path(path)), problem
+    def __init__(self, path: Path | None, mark: str | None, start: Mapping[str, float]):
+        """`mark`: of the problem (`mark_of`); None where it can't be told from another: nothing is kept then."""
+        self.path = None if path is None or mark is None else Path(path)
+        self.mark, self.start = mark, {p: float(v) for p, v in start.items()}
         self.before: dict[str, dict[str, float]] = {}  # errors at the very start
         self.closing = False  # the swift descent had ended already
-        p = problem.predictor
-        fixed = {path: float(value) for path, value in problem.start.items() if path not in problem.free}
-        aims = (problem.free, fixed, problem.noise, problem.bounds, problem.priors, problem.loss, problem.stiffness)
-        self.mark = key.key(p.model, p.names, p.settings, p.setups, aims, problem.series.y)
-        if self.mark is None:  # a law from elsewhere, or code that has moved since it was loaded
-            self.path = None
 
     def values(self) -> dict[str, float]:
         """Where to begin: the kept values if they are of this problem, else its start."""
-        start = {path: float(v) for path, v in self.problem.start.items()}
         if self.path is None or not self.path.exists():
-            return start
+            return dict(self.start)
         kept = json.loads(self.path.read_text())
         if kept.get("mark") != self.mark:
-            return start
+            return dict(self.start)
         self.before, self.closing = kept["before"], kept["closing"]
-        return start | kept["values"]
+        return self.start | kept["values"]
 
     def keep(self, values: Mapping[str, float], closing: bool = False) -> None:
         """Note accepted values, and whether the chord steps of the end have begun."""

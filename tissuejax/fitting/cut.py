@@ -11,7 +11,7 @@ standard errors.
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -19,35 +19,26 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.effects.catalogue import effect
-from tissuejax.errors import InputError, UnstableSimulation
+from tissuejax.errors import InputError
 from tissuejax.estimation.covariance import uncertainty
-from tissuejax.estimation.descent import Ended
-from tissuejax.estimation.problem import Problem
 from tissuejax.experiments.cutting_blocks import Blocks, blocks
-from tissuejax.experiments.cutting_record import FORCE, Path, drawn
+from tissuejax.experiments.cutting_record import FORCE, drawn
+from tissuejax.experiments.cutting_record import Path as Way
 from tissuejax.experiments.cutting_run import CuttingSettings, element_size
 from tissuejax.experiments.predictor import predictor
+from tissuejax.fitting.checkpoint import Checkpoint, mark_of
 from tissuejax.fitting.cut_balance import by_balance, linear
 from tissuejax.fitting.cut_meshes import COARSER, FINER, on_one_mesh, on_two_meshes
 from tissuejax.fitting.cut_resolution import plane_modulus, refuse_joules
-from tissuejax.fitting.cut_result import ENERGY, FRICTION, OPEN, STRENGTH, CutFit, described, misfit_said
-from tissuejax.fitting.least_squares import descend
-from tissuejax.fitting.options import Unknowns
-from tissuejax.fitting.setup import problem
+from tissuejax.fitting.cut_result import ENERGY, FRICTION, OPEN, STRENGTH, CutFit, misfit_said
+from tissuejax.fitting.cut_search import Search, posed_at
 from tissuejax.model import Model
 from tissuejax.parameters import checked, under
+from tissuejax.progress import Progress, Silent
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
-SLICES = 12
-SETTLED, FAR = 1e-3, 1e-2  # relative decrease of the misfit at which a descent ends: the last, the others
-SAME = 1.3  # a slice made for a strength serves up to this ratio
-# How far strength and energy may go from where a slice was made, in its first round and in later ones: toughness and
-# friction first, which mean and slope of the force tell from anywhere, and strength about them. All at once from half
-# the values, a descent went to a brittle tissue (strength at its bound, a twentieth of the toughness) and stayed there
-FIRST_STARTS, LATER = {STRENGTH: 1.25, ENERGY: 3.0}, {STRENGTH: 2.0, ENERGY: 2.0}
 
-
-def blocked(sample: Sample, paths: Mapping[str, Path], sizes: Mapping[str, float]) -> tuple[Sample, dict[str, Blocks]]:
+def blocked(sample: Sample, paths: Mapping[str, Way], sizes: Mapping[str, float]) -> tuple[Sample, dict[str, Blocks]]:
     """The sample with the means of each cutting force over blocks of `sizes` (m) of the way, and the blocks."""
     sample, out, made = drawn(sample), {}, {}
     for name, r in sample.recordings.items():
@@ -72,6 +63,8 @@ def fit_cut(
     settings: CuttingSettings | None = None,
     max_steps: int = 4,
     numerical: bool = True,
+    checkpoint: Path | None = None,
+    progress: Progress | None = None,
 ) -> CutFit:
     """Fit the cuts of a sample.
 
@@ -82,8 +75,11 @@ def fit_cut(
             strength by which faces part at half the blade's thickness. The descent begins with the best of them,
             and goes on to the next where it ends in no description of the record.
         names: recordings; all cuts by default.
-        by: "simulation", or "balance" (no strength). numerical: go on on a finer mesh, and add the step between the
-            two to the errors.
+        by: "simulation"; "balance" (no strength); "either": a simulation unless its elements resolve no strength by
+            which this blade would part the tissue, so that it could tell none.
+        numerical: go on on a finer mesh, and add the step between the two to the errors.
+        checkpoint: a file that keeps the last accepted values; the same fit goes on from there.
+        progress: advanced after every run.
 
     Raises:
         InputError: no cuts, values out of their range (an energy in J), or nothing known of the tissue: toughness
@@ -107,97 +103,67 @@ def fit_cut(
     first = by_balance(sample, model, known, names, dict(start or {}))
     if by == "balance":
         return first
-    balanced = linear(first.predictor, first.values, known)
-    values = first.values | balanced | dict(start or {})
-    thickness = min(p.thickness for p in first.predictor.paths_of.values())
-
-    def parting(v):  # at half the blade's thickness; faces that hold beyond it press on the flats
-        return v if STRENGTH in known else v | {STRENGTH: 4 * v[ENERGY] / thickness}
-
-    values = parting(values) | {k: v for k, v in (start or {}).items() if k == STRENGTH}
+    values = first.values | linear(first.predictor, first.values, known)
+    paths = first.predictor.paths_of
     settings = settings or CuttingSettings()
-    sizes = {n: element_size(settings, p) for n, p in first.predictor.paths_of.items()}
-    seen, means = blocked(sample, first.predictor.paths_of, sizes)
+    sizes = {n: element_size(settings, p) for n, p in paths.items()}
+    thickness = min(p.thickness for p in paths.values())
+    coarse = too_coarse(model, values, thickness, max(sizes.values()))
+    if by == "either" and coarse:
+        return replace(first, unidentified=first.unidentified | {STRENGTH: coarse})
+    seen, means = blocked(sample, paths, sizes)
     plain = replace(model, effects=tuple(e for e in model.effects if e.name != "onset"))
-    values = {k: v for k, v in values.items() if not k.startswith("effects.onset")}
     free = tuple(p for p in (STRENGTH, ENERGY, FRICTION) if p not in known)
     options = {"by": "simulation", "lenient": True, "blocks": means}
-    made = predictor(plain, seen, names, settings=settings, start=values, **options)
-    tried = (values, values | balanced, parting(values), parting(values | balanced))
-    starts = sorted({tuple(v.values()): v for v in tried}.values(), key=partial(_misfit, made, free))
-    best, runs = None, 0
-    for values in starts:  # the next only where the better one to begin with led to no description of the record
-        posed, ended, settled, spent = _rounds(made.prepared(values), free, values, max_steps)
-        runs += spent
-        if best is None or ended.cost < best[1].cost:
-            best = posed, ended, settled
-        if described(2 * best[1].cost / posed.n_samples, posed):
-            break
-    posed, ended, settled = best
-    values, declared = posed.values(ended.y), posed.predictor.model.parameters
-    if not np.isfinite(ended.cost):
-        raise UnstableSimulation(
-            f"no simulated cut of strength {values[STRENGTH]:.3g} Pa or more ran through: an element inverts at the "
-            "entry. Take larger elements (--h), start from a lower strength (--start cohesion.strength=...), or leave "
-            "the simulation (--by balance)"
-        )
-    if numerical:
-        others = (replace(settings, h=k * max(sizes.values())) for k in (FINER, COARSER))
-        meshes = (predictor(plain, seen, names, settings=other, start=values, **options) for other in others)
-        found = on_two_meshes(posed, values, *meshes)
-    else:
-        found = on_one_mesh(posed, values)
-    values, r, at, shift = found.values, found.residuals, found.predictor, found.shift
-    _, J = posed.linearised(values)
+    starts = _starts(values, dict(start or {}), known, thickness)
+    made = predictor(plain, seen, names, settings=settings, start=starts[0], **options)
+    with (progress or Silent()).stage(f"cutting {', '.join(names)}", None) as stage:
+        mark = mark_of(posed_at(made, free, starts[0], {}), settings, made.paths_of, max_steps)
+        search = Search(free, max_steps, Checkpoint(checkpoint, mark, starts[0]), stage)
+        best = search.best(made, starts)
+        posed = best.posed
+        values, declared = posed.values(best.ended.y), posed.predictor.model.parameters
+        if numerical:
+            stage.advance(note="elements of half the size")
+            others = (replace(settings, h=k * max(sizes.values())) for k in (FINER, COARSER))
+            meshes = (predictor(plain, seen, names, settings=other, start=values, **options) for other in others)
+            found = on_two_meshes(posed, values, *meshes)
+        else:
+            found = on_one_mesh(posed, values)
+        values, r, at, shift = found.values, found.residuals, found.predictor, found.shift
+        stage.advance(note="standard errors")
+        _, J = posed.linearised(values)
+        search.kept.done()
     widening = max(1.0, float(np.sqrt(r @ r / max(1, len(r) - len(free)))))
     scale = np.array([declared[p].typical for p in free])
     spread = uncertainty(J, posed.vector(values), scale, free, tuple(declared[p].unit for p in free), widening)
     std = {p: float(np.hypot(s, shift[p])) for p, s in zip(free, spread.std, strict=True)}
-    at_bound = dict(zip(free, posed.box.at_bound(ended.y), strict=True))
+    at_bound = dict(zip(free, posed.box.at_bound(best.ended.y), strict=True))
     why = _unidentified(at, values, std, free, at_bound)
     if not np.isfinite(list(shift.values())).all():
         why |= dict.fromkeys(free, "elements of no other size ran through, so what the mesh does to it is not known")
-    status = "converged" if settled else ended.reason if not ended.converged else "slice and estimate do not settle"
     worst = max(float(x.imbalance) for x in found.ran.values())
     chi2 = float(r @ r / len(r))
     said = (*misfit_said(chi2, posed), *_unresolved(plain, values, thickness, max(sizes.values()), free, why))
     if numerical and not found.finer:
         said += ("elements of half the size did not run through, so these are the values of the fit's own elements",)
-    return CutFit(values, std, shift, why, chi2, status, runs, by, at, found.predicted, worst, said)
+    return CutFit(
+        values, std, shift, why, chi2, best.status, search.runs, "simulation", at, found.predicted, worst, said
+    )
 
 
-def _rounds(made, free, values, max_steps) -> tuple[Problem, Ended, bool, int]:
-    """Descents from one start, the slice made anew between them: the last, whether they settled, runs.
+def _starts(balanced, told, known, thickness) -> list[dict[str, float]]:
+    """Where descents may begin: what was told over what the balance says, and the balance alone; either also with the
+    strength by which faces part at half the blade's thickness (faces that hold beyond it press on the flats)."""
 
-    Settled is what a slice made for it leaves in place, by a descent that converges or finds less than `FAR` to gain
-    (facets that come over an edge put kinks into the misfit, on which a descent may shrink its steps for ever; a slice
-    made anew gets it off them, so few evaluations are spent on each).
-    """
-    runs = 0
-    for n in range(SLICES):
-        posed = _posed(made, free, values, LATER if n else FIRST_STARTS)
-        ended = descend(posed, values, max_steps=max_steps, tolerance=SETTLED if n else FAR)
-        runs += ended.runs
-        if not np.isfinite(ended.cost):  # the entry folds: weaker tissue does not
-            values = values | {STRENGTH: values[STRENGTH] / 2}
-        else:
-            before, values = values, posed.values(ended.y)
-            near = max(abs(np.log(values[p] / before[p])) for p in LATER) < np.log(SAME)
-            if n and near and (ended.converged or ended.cost > (1 - FAR) * ended.trace[0][0]):
-                return posed, ended, True, runs
-        made = made.prepared(values)
-    return posed, ended, False, runs
+    def parting(v):
+        return v if STRENGTH in known else v | {STRENGTH: 4 * v[ENERGY] / thickness}
 
-
-def _misfit(made, free, values) -> float:
-    """Sum of squares at a start; infinite where the run breaks down."""
-    r, _ = _posed(made.prepared(values), free, values, {}).linearised(values)
-    return float(r @ r) if np.isfinite(r).all() else np.inf
-
-
-def _posed(made, free, values, reach):
-    bounds = {p: (values[p] / k, values[p] * k) for p, k in reach.items() if p in free}
-    return problem(made, unknowns=Unknowns(free=free, start=values, bounds=bounds))
+    balanced = {k: v for k, v in balanced.items() if not k.startswith("effects.onset")}
+    own = {k: balanced[k] for k in (ENERGY, FRICTION) if k not in known}
+    first = parting(balanced | told) | {k: v for k, v in told.items() if k == STRENGTH}
+    tried = (first, first | own, parting(first), parting(first | own))
+    return list({tuple(v.values()): v for v in tried}.values())
 
 
 def _unidentified(p, values, std, free, at_bound) -> dict[str, str]:
@@ -220,12 +186,28 @@ def _unidentified(p, values, std, free, at_bound) -> dict[str, str]:
     return why
 
 
+def too_coarse(model: Model, values, thickness: float, h: float) -> str:
+    """Why elements of size `h` tell no strength by which this blade parts the tissue, or nothing."""
+    least = 2 * values[ENERGY] / thickness
+    cohesive = _plane(model, values) * values[ENERGY] / least**2
+    if cohesive >= h:
+        return ""
+    return (
+        f"a blade of {1e3 * thickness:.3g} mm parts this tissue at {least:.3g} Pa or more, which elements of "
+        f"{1e3 * h:.3g} mm do not resolve (cohesive length {1e3 * cohesive:.3g} mm): a simulation would tell none. "
+        "`tissuejax cut resolve` says which elements would; --by simulation simulates all the same"
+    )
+
+
+def _plane(model: Model, values) -> float:
+    mu = float(model.energy.initial_shear_modulus(under("energy", values)))
+    return plane_modulus(mu, float(model.volumetric.bulk_modulus(under("volumetric", values))))
+
+
 def _unresolved(model: Model, values, thickness: float, h: float, free, why: dict[str, str]) -> tuple[str, ...]:
     """A warning where faces hold on beside the blade; into `why` a fitted strength that elements of size h do not
     resolve."""
-    mu = float(model.energy.initial_shear_modulus(under("energy", values)))
-    bulk = float(model.volumetric.bulk_modulus(under("volumetric", values)))
-    cohesive = plane_modulus(mu, bulk) * values[ENERGY] / values[STRENGTH] ** 2
+    cohesive = _plane(model, values) * values[ENERGY] / values[STRENGTH] ** 2
     if STRENGTH in free and cohesive < h:
         why[STRENGTH] = (
             f"elements of {1e3 * h:.3g} mm do not resolve it (cohesive length {1e3 * cohesive:.3g} mm), so it is a "

@@ -50,6 +50,7 @@ def descend(
     tolerance: float = 1e-9,
     on_accept: Callable[[int, float, dict[str, float]], None] | None = None,
     to_beat: float = np.inf,
+    on_run: Callable[[], None] | None = None,
 ) -> Ended:
     """The bare minimisation from one start; `Ended.y` are the free parameters themselves, in the order of
     `problem.free`.
@@ -62,6 +63,8 @@ def descend(
         tolerance: relative decrease of the misfit below which it stops.
         on_accept: called with evaluations, chi-square and values after every accepted step.
         to_beat: cost another start reached.
+        on_run: called after every evaluation of residuals and derivatives ("levenberg-marquardt" that is not by
+            projection).
     """
     x = problem.vector(start if start is not None else problem.start)
     if method == "levenberg-marquardt" and separable(problem):
@@ -77,7 +80,7 @@ def descend(
 
     accepted = report if on_accept is not None else None
     if method == "levenberg-marquardt":
-        found = minimised(InBox(problem), y, trust_region(len(y), max_steps, tolerance, to_beat), accepted)
+        found = minimised(InBox(problem, on_run), y, trust_region(len(y), max_steps, tolerance, to_beat), accepted)
     elif method in GRADIENT_METHODS:
         found = gradient_descent(problem, y, method, max_steps=max_steps, tolerance=tolerance, on_accept=accepted)
     else:
@@ -92,8 +95,9 @@ class InBox(LeastSquares):
     Residuals and derivatives come from one run in forward mode; those of the last point are kept.
     """
 
-    def __init__(self, problem: Problem):
+    def __init__(self, problem: Problem, on_run: Callable[[], None] | None = None):
         self.problem, self.at, self.last = problem, b"", (np.zeros(0), np.zeros((0, 0)))
+        self.on_run = on_run or (lambda: None)
 
     def linearised(self, y: Float[np.ndarray, " p"]) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n p"]]:
         """Both; infinite residuals where either is not finite."""
@@ -104,6 +108,7 @@ class InBox(LeastSquares):
             jacobian = chained(jacobian, slope) * bend[:, None]
             good = np.isfinite(half_square(r)) and np.isfinite(jacobian).all()
             self.at, self.last = y.tobytes(), (r if good else np.full_like(r, np.inf), jacobian)
+            self.on_run()
         return self.last
 
     def residuals(self, y: Float[np.ndarray, " p"]) -> Float[np.ndarray, " n"]:

@@ -30,7 +30,7 @@ from tissuejax.estimation.transforms import chained, unchained
 from tissuejax.experiments.probing_predictor import ProbingPredictor, make_ready
 from tissuejax.fitting.advice import warnings_of
 from tissuejax.fitting.bands import fitted_std
-from tissuejax.fitting.checkpoint import Checkpoint
+from tissuejax.fitting.checkpoint import Checkpoint, mark_of
 from tissuejax.fitting.closing import close
 from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
@@ -101,7 +101,7 @@ def fit_probed(
     if not isinstance(fine, ProbingPredictor):
         raise InputError("fit_probed takes a predictor of probings; use fit for material tests")
     begun = time.perf_counter()
-    kept = Checkpoint(checkpoint, problem)
+    kept = Checkpoint(checkpoint, mark_of(problem, fine.settings, fine.setups), problem.start)
     start = kept.values()
     with (progress or Silent()).stage(f"fitting {', '.join(fine.names)}", None) as stage:
         runs = Runs(problem, stage, kept, on_accept)

@@ -8,15 +8,17 @@ import numpy as np
 from tissuejax.fitting.cut_result import CutFit
 from tissuejax.fitting.sawtooth import SECTIONS, Sawtooth
 from tissuejax.recordings.recording import Sample
-from tissuejax.report.page import png, render
-from tissuejax.report.plot import INK, MEASURED, MODEL, SERIES, grid
+from tissuejax.report import cut_fit
+from tissuejax.report.page import png, printable, render
+from tissuejax.report.plot import MEASURED, MODEL, SERIES, grid
 from tissuejax.storage import write_bytes, write_json, write_text
 
 
 def write_cut(
     out: Path, record: Mapping, teeth: Mapping[str, Sawtooth], sample: Sample, found: CutFit | None, field=None
 ) -> dict[str, Path]:
-    """result.json, report.html and figures of an identification or a fit; paths by name."""
+    """result.json, report.html and figures of an identification or a fit (of a fit its curves as CSV and its parameters
+    as LaTeX too); paths by name."""
     pictures = []
     if teeth:
         pictures.append(
@@ -25,33 +27,22 @@ def write_cut(
         text = "Strength by section length, and energy, tooth by tooth (the source's way)."
         pictures.append(("strength", text, _strengths(teeth)))
     if found is not None:
-        pictures.append(
-            ("record", "Force against the motion: recorded and predicted at the estimate.", _overlay(found))
-        )
+        text = "Force against the motion over time and over the place of the edge, and what the fit leaves of it."
+        if found.by == "balance":
+            text += " What is at the entry, or just after a turn, takes no part in a fit by the balance of energies."
+        pictures.append(("record", text, cut_fit.overlay(found)))
     if field is not None:
         pictures.append(("along", "Toughness along the path.", _field(field)))
     written = {"result": write_json(out / "result.json", record)}
-    shown = []
-    for name, caption, figure in pictures:
-        picture = png(figure)
-        written[name] = write_bytes(out / f"{name}.png", picture)
-        shown.append({"name": name, "caption": caption, "png": picture})
-    lines = [] if found is None else _rows(found)
-    said = "" if found is None else " ".join(f"Take care: {w}." for w in found.warnings)
-    page = render("cutting.html.j2", title=f"{sample.name}: cut", text=said, rows=lines, figures=shown)
+    drawn = [{"name": n, "caption": text, "png": png(f), "figure": f} for n, text, f in pictures]
+    written |= {d["name"]: write_bytes(out / f"{d['name']}.png", d["png"]) for d in drawn}
+    lines, said = ([], []) if found is None else (cut_fit.rows(found), cut_fit.sentences(found))
+    page = render("cutting.html.j2", title=f"{sample.name}: cut", said=said, rows=lines, figures=drawn)
     written["page"] = write_text(out / "report.html", page)
-    return written
-
-
-def _rows(found: CutFit) -> list[dict]:
-    declared, rows = found.predictor.model.parameters, []
-    for path, std in found.std.items():
-        low, high = found.interval[path]
-        why = found.unidentified.get(path)
-        note = f"not identified: {why}" if why else f"{low:.4g} to {high:.4g}"
-        row = {"path": path, "value": f"{found.values[path]:.4g}", "std": f"{std:.2g}", "unit": declared[path].unit}
-        rows.append(row | {"note": note})
-    return rows
+    if found is not None:
+        written["curves"] = cut_fit.write_curves(found, out / "curves.csv")
+        written["table"] = cut_fit.write_latex(found, out / "parameters.tex")
+    return written | printable(drawn, out)
 
 
 def _saw(teeth):
@@ -87,20 +78,6 @@ def _strengths(teeth):
         ax.set_xticks(np.arange(1, most + 1, max(1, most // 10)))
     axes[0].legend(fontsize=6, frameon=False, title="section of the edge, mm", title_fontsize=6)
     axes[1].legend(fontsize=7, frameon=False)
-    return figure
-
-
-def _overlay(found: CutFit):
-    names = found.predictor.names
-    figure, axes = grid(len(names), 1, 9.0, 2.9)
-    for ax, name in zip(axes, names, strict=True):
-        seen = found.predictor.sample.recordings[name].channels["cutting_force"]
-        made = found.predicted[name].channels["cutting_force"]
-        ax.plot(seen.time, seen.values, ".", color=MEASURED, markersize=2.5, label="recorded")
-        ax.plot(made.time, made.values, color=MODEL, linewidth=1.5, label=f"predicted by {found.by}")
-        ax.axhline(0, color=INK, linewidth=0.5)
-        ax.set(xlabel="time (s)", ylabel="force (N)", title=name)
-        ax.legend(fontsize=7, frameon=False)
     return figure
 
 

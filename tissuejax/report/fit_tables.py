@@ -35,9 +35,10 @@ def write_latex(found: Fit, path: Path) -> Path:
     lines = [r"\begin{tabular}{lrrl}", r"parameter & value & 95\,\% interval & unit \\ \hline"]
     for row in sentences.table(found):
         cells = [row["path"], row["value"], row["interval"] or row["note"], row["unit"]]
-        lines.append(" & ".join(map(_escaped, cells)) + r" \\")
+        lines.append(" & ".join(map(escaped, cells)) + r" \\")
     return write_text(path, "\n".join([*lines, r"\end{tabular}"]) + "\n")
 
 
-def _escaped(text: str) -> str:
+def escaped(text: str) -> str:
+    """Text for LaTeX."""
     return "".join(SPECIAL.get(c, c) for c in text)
