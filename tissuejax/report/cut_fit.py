@@ -13,7 +13,7 @@ from tissuejax.report.scales import display
 from tissuejax.storage import write_text
 
 CHANNEL = "cutting_force"
-BAND = 1.96  # standard deviations of the noise in which 95 % of the samples are
+NORMAL_95 = 1.96  # standard deviations of the noise in which 95 % of the samples are
 CALLED = {
     STRENGTH: "strength of the faces",
     ENERGY: "toughness",
@@ -100,10 +100,8 @@ def overlay(found: CutFit):
             strict=True,
         ):  # fmt: skip
             if share is noise:
-                ax.fill_between(
-                    x, (made - BAND * noise) / by, (made + BAND * noise) / by, color=MODEL, alpha=0.18, linewidth=0,
-                    label="95 % of the noise",
-                )  # fmt: skip
+                low_, high = (made - NORMAL_95 * noise) / by, (made + NORMAL_95 * noise) / by
+                ax.fill_between(x, low_, high, color=MODEL, alpha=0.18, linewidth=0, label="95 % of the noise")
             ax.plot(x, seen / by, ".", color=MEASURED, markersize=3, label="recorded")
             ax.plot(x, made / by, color=MODEL, linewidth=1.3, label=f"predicted by {found.by}")
             ax.axhline(0, color=INK, linewidth=0.5)
