@@ -52,6 +52,13 @@ SLIPS = {
         "smoothed or filtered",
     ),
     "history": ({"stress": STRESS + 800}, "not at zero"),
+    "noise alone": ({"stress": np.random.default_rng(4).normal(0, 20, N)}, "does not follow the deformation"),
+    "stuck on the way": ({"stress": np.where(np.arange(N) // 40 == 2, STRESS[80], STRESS)}, "the sensor was stuck"),
+    "cable off": ({"stress": np.where(np.arange(N) < 150, STRESS, 0.0)}, "a cable off"),
+    "long at its end": ({"stress": np.minimum(STRESS, 800)}, "the sensor was at its end"),
+    "coarse": ({"stress": 500 * np.round(STRESS / 500)}, "comes in steps of 500 Pa"),
+    "spike": ({"stress": STRESS + 9000 * (np.arange(N) == 77)}, "one sample stands far beyond both neighbours"),
+    "uneven": ({"time": np.cumsum(np.where(np.arange(N) < 100, 0.03, 0.5))}, "sampled unevenly, 0.03 to 0.5 s apart"),
 }
 
 
@@ -59,6 +66,28 @@ SLIPS = {
 def test_each_slip_is_named(slip):
     changes, words = SLIPS[slip]
     assert words in said(**changes)
+
+
+@pytest.mark.parametrize("width", [1.0, 2.0, 3.0, 4.0])
+def test_noise_behind_a_filter_of_any_usual_width_is_seen(width):
+    """Beyond four samples and 400 of them, what is left of the noise is as smooth as the curve."""
+    from scipy.ndimage import gaussian_filter1d
+
+    stretch = np.linspace(1, 1.3, 400)
+    noise = gaussian_filter1d(np.random.default_rng(7).normal(0, 25, 400), width)
+    stress = 4000 * (stretch - stretch**-2) + noise
+    assert "smoothed or filtered" in said(stretch=stretch, stress=stress, time=np.linspace(0, 20, 400))
+
+
+def test_creep_is_no_sensor_at_its_end():
+    """The stress is set; the specimen goes on, ever slower. A sensor at its end leaves a ramp as fast as it was."""
+    time = np.linspace(0, 60, N)
+    creep = 1.1 + 0.05 * (1 - np.exp(-time / 10))
+    ramp = np.minimum(time / 5, 1)
+    words = said(stretch=1 + (creep - 1) * ramp, stress=500 * ramp, time=time)
+    assert "a creep test" in words
+    assert "at its end" not in words
+    refuse_unusable(sample(r=recording(creep, np.full(N, 500.0), time)), ("r",))  # a hold alone can be fitted
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -89,6 +118,8 @@ UNUSABLE = {
     "absurd": ({"r": recording(stress=1e300 * STRESS)}, "nothing that is measured exceeds"),
     "dead": ({"r": recording(stress=np.zeros(N))}, "zero throughout"),
     "nothing done": ({"r": recording(stretch=np.ones(N), stress=np.full(N, 5.0))}, "nothing to fit"),
+    "noise alone": ({"r": recording(stress=np.random.default_rng(4).normal(0, 20, N))}, "does not follow"),
+    "constant": ({"r": recording(stress=np.full(N, 1025.0))}, "1025 Pa throughout while the specimen moves"),
     "two rows": ({"r": recording(time=np.arange(2.0))}, "2 samples"),
     "noise zero beside noise": ({"a": recording(), "b": recording(noise=0.0)}, "weigh infinitely"),
 }

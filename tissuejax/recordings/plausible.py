@@ -8,21 +8,16 @@ possible.
 from collections.abc import Iterable
 
 import numpy as np
-from jaxtyping import Float
 
 from tissuejax.errors import InputError
+from tissuejax.recordings import plausible_signals as signals
+from tissuejax.recordings.plausible_signals import drive_of, load_of, unanswered
 from tissuejax.recordings.recording import Recording, Sample
 
 STRETCH = (0.2, 4.0)  # what soft tissue bears
 STRESSES = (1.0, 1e8)  # Pa: below, no cell measures it; above, it is steel's
 FEW = 10  # samples
 ABSURD = 1e20  # SI: squares and their sums stay far from overflow, and nothing measured is near
-RUN = 5  # equal samples in a row at the largest value: a sensor at its end
-MOST_OF = 0.5  # of a recording: a stress that stays that long was set, no sensor is at its end so long
-END = "the sensor was at its end"
-GAP = 20.0  # times the usual step
-FILTERED = 2.0  # noise seen eight samples apart over noise seen between neighbours
-LONG = 100  # samples from which the noise can be looked at
 
 
 def slips(sample: Sample, names: Iterable[str] | None = None) -> list[str]:
@@ -35,7 +30,7 @@ def slips(sample: Sample, names: Iterable[str] | None = None) -> list[str]:
     said = []
     for name in sample.recordings if names is None else names:
         recording = sample.recordings[name]
-        for check in (_stretch, _stress, _sense, _dead, _saturated, _few, _uneven, _filtered, _history):
+        for check in CHECKS:
             said += [f"{name}: {sentence}" for sentence in check(recording)]
     return said
 
@@ -45,7 +40,8 @@ def refuse_unusable(sample: Sample, names: Iterable[str]) -> None:
 
     Raises:
         InputError: fewer than three samples, values beyond 1e20, a channel that reads zero throughout, one that never
-            changes while nothing is done either, or a noise level of zero beside recordings with noise.
+            changes while nothing is done either, a stress that does not answer the deformation, or a noise level of
+            zero beside recordings with noise.
     """
     names = tuple(names)
     for name in names:
@@ -68,7 +64,12 @@ def refuse_unusable(sample: Sample, names: Iterable[str]) -> None:
                     f"recording {name}: {key} is zero throughout: the sensor was dead or the wrong column was read; "
                     "mend the side file or leave the recording out"
                 )
-            drive = _drive(recording)
+            if key == "nominal_stress" and (why := unanswered(recording)):
+                raise InputError(
+                    f"recording {name}: {key} {why}: the sensor was dead or the wrong column was read; mend the side "
+                    "file or leave the recording out"
+                )
+            drive = drive_of(recording)
             if drive is not None and len(seen) and np.ptp(seen) == 0 and np.ptp(drive) == 0:
                 raise InputError(
                     f"recording {name}: neither the deformation nor {key} ever changes: there is nothing to fit; "
@@ -99,23 +100,6 @@ def refuse_gaps(sample: Sample, names: Iterable[str]) -> None:
                 )
 
 
-def _drive(recording: Recording) -> Float[np.ndarray, " n"] | None:
-    """Stretch minus one, or shear, of a material test (the first axis of two); None for others."""
-    for key, rest in (("stretch", 1.0), ("shear", 0.0)):
-        if key in recording.inputs:
-            values = np.asarray(recording.inputs[key], float)
-            return values.reshape(len(values), -1)[:, 0] - rest
-    return None
-
-
-def _load(recording: Recording) -> Float[np.ndarray, " n"] | None:
-    channel = recording.channels.get("nominal_stress")
-    if channel is None:
-        return None
-    values = np.asarray(channel.values, float)
-    return values.reshape(len(values), -1)[:, 0]
-
-
 def _stretch(recording: Recording) -> list[str]:
     if "stretch" not in recording.inputs:
         return []
@@ -138,7 +122,7 @@ def _stretch(recording: Recording) -> list[str]:
 
 
 def _stress(recording: Recording) -> list[str]:
-    load = _load(recording)
+    load = load_of(recording)
     if load is None:
         return []
     most = float(np.abs(load).max())
@@ -156,7 +140,7 @@ def _stress(recording: Recording) -> list[str]:
 
 
 def _sense(recording: Recording) -> list[str]:
-    drive, load = _drive(recording), _load(recording)
+    drive, load = drive_of(recording), load_of(recording)
     if drive is None or load is None or np.ptp(drive) < 0.02 or not np.ptp(load):
         return []
     start = int(np.argmin(np.abs(drive)))
@@ -176,102 +160,14 @@ def _sense(recording: Recording) -> list[str]:
     return []
 
 
-def _dead(recording: Recording) -> list[str]:
-    said = []
-    for key, channel in recording.channels.items():
-        values = np.asarray(channel.values, float)
-        seen = values[np.isfinite(values)]
-        if key == "markers" or len(seen) < 2:
-            continue
-        if not seen.any():
-            said.append(f"{key} is zero throughout: a dead sensor or the wrong column")
-        elif np.ptp(seen) == 0:
-            said.append(
-                f"{key} reads {seen[0]:.4g} throughout: a stuck sensor, or a set value instead of a measured one"
-            )
-    every = np.asarray(recording.inputs.get("stretch", recording.inputs.get("shear", np.zeros(0))), float)
-    if len(every) > 1 and not np.ptp(every, axis=0).any():
-        said.append("the deformation never changes: a hold whose beginning is missing, or a dead column")
-    return said
-
-
-def _saturated(recording: Recording) -> list[str]:
-    drive, load = _drive(recording), _load(recording)
-    if drive is None or load is None:
-        return []
-    seen = np.isfinite(load)
-    drive, load = drive[seen], load[seen]
-    if len(load) < 4 * RUN or not np.ptp(load) or not np.ptp(drive):
-        return []
-    for value, word in ((load.max(), "largest"), (load.min(), "smallest")):
-        at = np.concatenate([[0], (load == value).astype(int), [0]])
-        edges = np.diff(at)
-        begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-        longest = int(np.argmax(ends - begins))
-        a, b = begins[longest], ends[longest]
-        if value != 0 and b - a >= RUN and np.ptp(drive[a:b]) > 0.01 * np.ptp(drive):
-            return [
-                f"stress stays at exactly {value:.4g} Pa, its {word} value, over {b - a} samples while the specimen "
-                f"moves: {'a creep test, whose stress is what was set' if b - a > MOST_OF * len(load) else END}"
-            ]
-    return []
-
-
 def _few(recording: Recording) -> list[str]:
     least = min((len(np.asarray(c.values)) for c in recording.channels.values()), default=0)
     return [f"{least} samples only: too few to tell a model from noise"] if least < FEW else []
 
 
-def _uneven(recording: Recording) -> list[str]:
-    for key, channel in recording.channels.items():
-        steps = np.diff(np.asarray(channel.time, float))
-        if len(steps) < FEW:
-            continue
-        usual, most = float(np.median(steps)), float(steps.max())
-        if most > GAP * usual:
-            at = float(np.asarray(channel.time)[int(np.argmax(steps))])
-            return [
-                f"{key} has a gap of {most:.4g} s after {at:.4g} s, where the usual step is {usual:.3g} s: whatever "
-                "the tissue remembers of it is not in the recording"
-            ]
-    return []
-
-
-def _filtered(recording: Recording) -> list[str]:
-    load = _load(recording)
-    if load is None or len(load) < LONG or not np.ptp(load):
-        return []
-    near, middle, far = (_noise(load, stride) for stride in (1, 3, 8))
-    # Curvature makes it grow with the fourth power of the stride, filtered noise only until the filter's length.
-    noise_like = middle > 1.3 * near and far < 5 * middle
-    if near > 0 and noise_like and far > FILTERED * near and far > 1e-5 * np.ptp(load):
-        return [
-            f"neighbouring samples differ {far / near:.1f} times less than samples eight apart: the signal was "
-            "smoothed or filtered, so a noise level estimated from neighbours is too small; give [noise]"
-        ]
-    return []
-
-
-def _noise(values: Float[np.ndarray, " n"], stride: int) -> float:
-    """Noise from fourth differences `stride` samples apart: blind to any cubic, robust against kinks by the median.
-
-    Fourth differences of white noise have the variance 70 s^2 (1 + 16 + 36 + 16 + 1); 1.4826 turns a median absolute
-    value into a standard deviation.
-    """
-    v = values
-    differences = (
-        v[: -4 * stride]
-        - 4 * v[stride : -3 * stride]
-        + 6 * v[2 * stride : -2 * stride]
-        - 4 * v[3 * stride : -stride]
-        + v[4 * stride :]
-    )
-    return float(1.4826 * np.median(np.abs(differences)) / np.sqrt(70.0))
-
-
 def _history(recording: Recording) -> list[str]:
-    load = _load(recording)
-    drive = _drive(recording)
+    load = load_of(recording)
+    drive = drive_of(recording)
     if load is None or len(load) < FEW or not np.ptp(load):
         return []
     if drive is None or abs(drive[0]) > 0.05 * np.abs(drive).max():  # said already: not at rest
@@ -284,3 +180,18 @@ def _history(recording: Recording) -> list[str]:
             "before the recording that the model doesn't know of"
         ]
     return []
+
+
+CHECKS = (
+    _stretch,
+    _stress,
+    _sense,
+    signals.dead,
+    signals.saturated,
+    signals.coarse,
+    signals.spiked,
+    _few,
+    signals.uneven,
+    signals.filtered,
+    _history,
+)
