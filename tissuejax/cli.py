@@ -152,8 +152,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         print(json.dumps(plain(reply.record), indent=2, ensure_ascii=False) if given.json else reply.text)
         sys.stdout.flush()
-    except BrokenPipeError:  # the reader (head, less) has seen enough
+    except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):  # the reader (head, less) has seen enough
+            return _refused(name, InputError(f"standard output: {sentence(error)}"), False)
     return reply.code
 
 

@@ -18,8 +18,10 @@ import jax
 
 from tissuejax.energies import catalogue as names
 from tissuejax.energies.energy import Energy
+from tissuejax.errors import UnstableSimulation
 from tissuejax.experiments.catalogue import experiment
 from tissuejax.experiments.predictor import predictor
+from tissuejax.experiments.probing_slips import all_slips
 from tissuejax.families import lookup, members
 from tissuejax.fitting import kinds
 from tissuejax.fitting.kinds.fitted import Fitted
@@ -29,7 +31,7 @@ from tissuejax.fitting.setup import problem, split
 from tissuejax.model import Model
 from tissuejax.progress import Progress
 from tissuejax.recordings.files import read
-from tissuejax.recordings.plausible import refuse_unusable, slips
+from tissuejax.recordings.plausible import refuse_unusable
 from tissuejax.recordings.recording import Sample
 
 if TYPE_CHECKING:
@@ -121,8 +123,12 @@ def fit(
     if first is not None:
         begun = kind.begin(posed, first, start or {})
         posed = replace(posed, start=dict(posed.start) | begun.start)
-    found = kind.fit(posed, held, search, frozenset(start or ()), progress)
-    found.warnings.extend(f"Look at the data: {sentence}." for sentence in slips(sample, (*fitted, *held)))
+    said = all_slips(sample, (*fitted, *held))
+    try:
+        found = kind.fit(posed, held, search, frozenset(start or ()), progress)
+    except UnstableSimulation as error:
+        raise UnstableSimulation(f"{error}{'. First look at the data: ' if said else ''}{'; '.join(said)}") from error
+    found.warnings.extend(f"Look at the data: {sentence}." for sentence in said)
     return found if begun is None else replace(found, first=begun)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.outputs import folder_named
+from tissuejax.experiments.probing_slips import probing_slips
 from tissuejax.recordings.files import names, read
 from tissuejax.recordings.layouts import LAYOUTS
 from tissuejax.recordings.recording import Recording, Sample
@@ -93,7 +94,7 @@ def described(sample: Sample) -> dict:
             "size": np.ptp(geometry.points, axis=0).tolist(),
         },
         "recordings": {name: _recording(r) for name, r in sample.recordings.items()},
-        "remarks": remarks(sample),
+        "remarks": remarks(sample) + probing_slips(sample),
     }
 
 

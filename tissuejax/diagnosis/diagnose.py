@@ -27,11 +27,12 @@ from tissuejax.energies.catalogue import energy as named_energy
 from tissuejax.energies.energy import Energy
 from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.catalogue import experiment
+from tissuejax.experiments.probing_slips import all_slips
 from tissuejax.families import lookup, members
 from tissuejax.model import Model
 from tissuejax.progress import Progress, Silent
 from tissuejax.recordings.files import read
-from tissuejax.recordings.plausible import refuse_gaps, refuse_unusable, slips
+from tissuejax.recordings.plausible import refuse_gaps, refuse_unusable
 from tissuejax.recordings.recording import Sample
 from tissuejax.storage import write_json
 
@@ -83,7 +84,7 @@ def diagnose(
         offers = (*all_effects(), SCATTER.name, HYSTERESIS.name)
         if name not in offers:
             raise unknown("effect", name, offers)
-    remarks += slips(sample, (*fitted, *held_out))
+    remarks += all_slips(sample, (*fitted, *held_out))
     kind = experiment(sample.recordings[fitted[0]].experiment).kind
     stated = [*([e.name for e in energy.effects] if isinstance(energy, Model) else ()), *_items(known)]
     base = energy.energy if isinstance(energy, Model) else energy

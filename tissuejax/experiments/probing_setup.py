@@ -83,7 +83,7 @@ def setups(model: Model, sample: Sample, names: Sequence[str], settings: Probing
     for name, recording in every.items():
         _check_clocks(recording)
         time, path = smooth_path(recording, settings.smoothing)
-        gaps[name] = surface_gap(path, _tip(recording), given.points, top)
+        gaps[name] = surface_gap(path, tip_of(recording), given.points, top)
         touch[name] = contact_span(name, time, gaps[name], path[0])
     rest = _rest(every, touch)
     out = {}
@@ -118,7 +118,7 @@ def _radius(recording: Recording) -> float:
     return float(recording.attributes["probe/radius"])
 
 
-def _tip(recording: Recording) -> Shape:
+def tip_of(recording: Recording) -> Shape:
     """A ball, or where the recording has a `probe/edge` a flat punch with an edge so rounded."""
     radius, edge = _radius(recording), recording.attributes.get("probe/edge")
     if edge is None:
@@ -202,7 +202,7 @@ def _setup(model, sample, recording, settings, lobe: Lobe | None, touch: Contact
         None,
         on,
     )
-    tip = probe(bare, _tip(recording), *_padded_path(time, path), near, settings.penalty, settings.softness)
+    tip = probe(bare, tip_of(recording), *_padded_path(time, path), near, settings.penalty, settings.softness)
     scene = eqx.tree_at(lambda s: s.probe, bare, _widened(tip), is_leaf=lambda x: x is None)
     test = ProbingTest(
         start=np.asarray(float(recording.attributes.get("start", 0.0))),
