@@ -251,3 +251,42 @@ def test_sensitivities_of_a_fit_with_one_relaxation_term(tmp_path, capsys):
     told = capsys.readouterr().out
     assert "effects.viscoelasticity.tau1" in told
     assert "effects.viscoelasticity.tau2" not in told
+
+
+@pytest.mark.parametrize(
+    ("typed", "words"),
+    [
+        (["--noise", "-1 Pa"], "0 or more"),
+        (["--noise", "20 Pa", "--seed", "-1"], "whole number from 0 on"),
+        (["--rate", "1e9"], "lower --rate"),
+        (["--set", "energy.mu=-3 kPa"], "energy.mu"),
+    ],
+)
+def test_a_simulation_that_can_not_be_is_refused(typed, words, capsys, tmp_path):
+    base = ["simulate", "--energy", "neo-hookean", "--mode", "uniaxial", "--path", "0:1 1:1.2"]
+    given = [] if "--set" in typed else ["--set", "energy.mu=3 kPa"]
+    assert main([*base, *given, *typed, "--out", str(tmp_path / "o")]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert len(said.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "constants", [["energy.C10=-1 kPa", "energy.C01=-2 kPa"], ["energy.C10=1 kPa", "energy.C01=-1.5 kPa"]]
+)
+def test_a_material_without_stiffness_at_rest_is_refused(constants, capsys, tmp_path):
+    """mu = 2 (C10 + C01) of Mooney-Rivlin."""
+    told = [x for c in constants for x in ("--set", c)]
+    base = ["simulate", "--energy", "mooney-rivlin", "--mode", "uniaxial", "--path", "0:1 1:1.2"]
+    assert main([*base, *told, "--out", str(tmp_path / "o")]) == 2
+    assert "shear modulus at rest would be -" in capsys.readouterr().err
+
+
+def test_standard_output_on_a_full_disk_ends_in_a_sentence():
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "tissuejax", "energies"], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert done.returncode == 2
+    assert "the disk is full" in done.stderr
+    assert "Traceback" not in done.stderr

@@ -48,7 +48,7 @@ SECONDS = 60.0
 def matter(*effects, **values) -> Matter:
     """A slab of liver-like tissue and the ball of the recordings; it relaxes unless other effects are named."""
     if not effects:
-        effects, values = (Viscoelasticity(),), {f"effects.viscoelasticity.{k}": v for k, v in PRONY.items()}
+        effects, values = (Viscoelasticity(terms=2),), {f"effects.viscoelasticity.{k}": v for k, v in PRONY.items()}
     model = Model(catalogue.energy("reduced-polynomial-2"), catalogue.volumetric("quadratic"), effects)
     values = model.defaults | {"energy.C10": 645.0, "energy.C20": 500.0, "volumetric.K": 20e3} | values
     return Matter(model, values, lobe_of_mesh(box(SIZE, (4, 4, 2))), RADIUS, 1060.0)

@@ -242,7 +242,7 @@ def test_units_of_the_card(units, factor):
 
 
 def test_relaxation_of_the_cards_is_ours():
-    model = tj.material("neo-hookean", effects=["viscoelasticity"])
+    model = tj.material("neo-hookean", effects=["viscoelasticity-2"])
     g = {"g1": 0.25, "g2": 0.4, "tau1": 0.5, "tau2": 6.0}
     values = {"energy.mu": 2000.0} | {f"effects.viscoelasticity.{k}": v for k, v in g.items()}
     values = model.defaults | values
@@ -337,3 +337,24 @@ def test_calculix_pulls_one_element_to_our_stress(name, tmp_path):
 
     l = brentq(lateral, 0.8, 1.0, xtol=1e-10)
     assert force == pytest.approx(float(ours(name, "quadratic", np.array([[stretch, l, l]]))[0, 0]), rel=1e-4)
+
+
+def test_a_card_with_constants_that_nobody_gave_is_refused(capsys, tmp_path):
+    from tissuejax.cli import main
+
+    typed = ["export", "--energy", "mooney-rivlin", "--to", "abaqus", "--out", str(tmp_path / "cards")]
+    assert main(typed) == 2
+    assert "missing energy.C10, energy.C01" in capsys.readouterr().err
+    assert not (tmp_path / "cards").exists()
+    assert main([*typed, "--set", "energy.C10=0.3 kPa", "--set", "energy.C01=100 Pa"]) == 0
+    assert "300" in next((tmp_path / "cards").iterdir()).read_text()
+
+
+def test_a_simulation_says_which_constants_nobody_gave(capsys, tmp_path):
+    from tissuejax.cli import main
+
+    typed = ["simulate", "--energy", "neo-hookean", "--mode", "uniaxial", "--path", "0:1 1:1.2"]
+    assert main([*typed, "--out", str(tmp_path / "a")]) == 0
+    assert "typical values: energy.mu = 1000 Pa" in capsys.readouterr().out
+    assert main([*typed, "--set", "energy.mu=3 kPa", "--out", str(tmp_path / "b")]) == 0
+    assert "typical" not in capsys.readouterr().out

@@ -94,5 +94,5 @@ def small():
     from tissuejax.effects.viscoelasticity import Viscoelasticity
 
     prony = {"g1": 0.2, "g2": 0.15, "tau1": 0.5, "tau2": 5.0}
-    tissue = matter(Viscoelasticity(), **{f"effects.viscoelasticity.{k}": v for k, v in prony.items()})
+    tissue = matter(Viscoelasticity(terms=2), **{f"effects.viscoelasticity.{k}": v for k, v in prony.items()})
     return precompute(tissue, SMALL_BOX, SMALL, processes=1, numerical=False)

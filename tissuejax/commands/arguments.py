@@ -72,7 +72,7 @@ def add_fit(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--max-steps", type=int, default=200, metavar="N", help="evaluations for each start (default 200)"
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the further starts (default 0)")
+    parser.add_argument("--seed", type=seed, default=0, help="of the further starts (default 0)")
     parser.add_argument(
         "--stable", action="store_true", help="keep the energy stable (Drucker) over the recorded stretches"
     )
@@ -137,6 +137,13 @@ def number(text: str, parameter: Parameter, what: str) -> float:
     if math.isnan(value):
         raise InputError(f"{what}: found no number, wanted is one, such as 12.5 {parameter.unit}")
     return value
+
+
+def seed(text: str) -> int:
+    """A seed as argparse reads it: a whole number from 0 on."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"found {text}, expected a whole number from 0 on")
+    return int(text)
 
 
 def positive(value: int, option: str) -> int:

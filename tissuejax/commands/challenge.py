@@ -8,7 +8,7 @@ from tissuejax.challenge.compare import compare
 from tissuejax.challenge.grade import grade
 from tissuejax.challenge.make import KINDS, make
 from tissuejax.challenge.run import run
-from tissuejax.commands.arguments import positive
+from tissuejax.commands.arguments import positive, seed
 from tissuejax.commands.command import Command, Reply
 from tissuejax.diagnosis.judgement.rejudge import rejudge
 from tissuejax.progress import for_terminal
@@ -45,7 +45,7 @@ says what simpler ways of answering would have said on the same cases.
             help="make: material tests (default), probing, rest, or cutting",
         )
         parser.add_argument("--count", type=int, default=200, metavar="N", help="make: number of cases (default 200)")
-        parser.add_argument("--seed", type=int, default=1, help="make: the same seed gives the same cases (default 1)")
+        parser.add_argument("--seed", type=seed, default=1, help="make: the same seed gives the same cases (default 1)")
         parser.add_argument(
             "--commit", metavar="HASH", help="make: draw the seed from this commit's hash, so that nobody chooses it"
         )

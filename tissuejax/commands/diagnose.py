@@ -1,6 +1,8 @@
 """`tissuejax diagnose`: what is missing in the model of a recording, where, and how sure."""
 
 import argparse
+import re
+import shlex
 from pathlib import Path
 from typing import ClassVar
 
@@ -10,7 +12,9 @@ from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.outputs import add_out, folder
 from tissuejax.diagnosis.diagnose import diagnose
 from tissuejax.diagnosis.result import Diagnosis
+from tissuejax.effects.catalogue import effect, effects
 from tissuejax.errors import unknown
+from tissuejax.experiments.catalogue import experiment
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read
 from tissuejax.recordings.recording import Sample
@@ -84,7 +88,9 @@ tests and cuts begin anew.
             keep=out / "runs",
             known=given.known,
         )
-        return diagnosed(found, write_diagnosis(found, out))
+        reply = diagnosed(found, write_diagnosis(found, out))
+        again = _fit_with(found, sample, given)
+        return reply if not again else Reply(reply.record | {"fit": again}, f"{reply.text}\nfit      {again}")
 
 
 def _only(sample: Sample, only: list[str], holdout: list[str] | None) -> Sample:
@@ -96,6 +102,30 @@ def _only(sample: Sample, only: list[str], holdout: list[str] | None) -> Sample:
         return sample
     kept = {n: r for n, r in sample.recordings.items() if n in only or n in (holdout or ())}
     return eqx.tree_at(lambda s: s.recordings, sample, kept, is_leaf=lambda x: isinstance(x, dict))
+
+
+def _fit_with(found: Diagnosis, sample: Sample, given: argparse.Namespace) -> str:
+    """The command that fits with what was named; "" where nothing was, or where `fit` can't be told of it."""
+    options: list[str] = []
+    for one in found.as_dict()["effects"] if found.verdict.chosen else ():
+        name, values = one["name"], {p.rpartition(".")[2]: v["value"] for p, v in one["parameters"].items()}
+        terms = sum(bool(re.fullmatch(r"g\d", p)) for p in values)
+        typed = f"{name}-{terms}" if terms > 1 else name
+        if name not in effects() or any(p.rpartition(".")[0] != f"effects.{name}" for p in one["parameters"]):
+            return ""
+        known = {d.name: d for d in effect(typed).parameters}
+        if not values.keys() <= known.keys():
+            return ""
+        options += ["--effect", typed]
+        for p, v in values.items():
+            if known[p].frozen and v != known[p].default:
+                options += ["--fix", f"effects.{name}.{p}={v:.6g}"]
+    kinds = {experiment(r.experiment).kind for r in sample.recordings.values()}
+    if not options or "cutting" in kinds:
+        return ""
+    held = [x for name in found.as_dict()["held_out"] for x in ("--holdout", name)]
+    form = ["--ogden-form", given.ogden_form] if given.ogden_form else []
+    return shlex.join(["tissuejax", "fit", str(given.file), "--energy", given.energy, *form, *options, *held])
 
 
 def diagnosed(found: Diagnosis, written: dict[str, Path]) -> Reply:
@@ -110,7 +140,7 @@ def diagnosed(found: Diagnosis, written: dict[str, Path]) -> Reply:
         rows = sentences.base(found)
         wide = max(24, *(len(r["path"]) + 2 for r in rows))
         lines += [f"  {r['path']:<{wide}}{r['before']:>16}{r['after']:>24} {r['unit']}".rstrip() for r in rows]
-    lines += ["", *judged.sure(found), ""]
+    lines += ["", *judged.sure(found), *(f"  ! {w}" for w in found.as_dict()["warnings"]), ""]
     lines += [f"page     {written['page']}", f"numbers  {written['result']}"]
     record = found.as_dict() | {
         "headline": headline(found),

@@ -8,6 +8,7 @@ from tissuejax import verbs
 from tissuejax.commands.arguments import values
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.outputs import folder_named
+from tissuejax.commands.results import refuse_softening
 from tissuejax.energies.catalogue import entries, entries_of
 from tissuejax.energies.published import PUBLISHED
 from tissuejax.errors import InputError
@@ -100,6 +101,7 @@ fibre family to any of them. Ogden constants mean nothing without their form, so
             raise InputError(f"--stretch {given.stretch}: wanted is LOW:HIGH, e.g. 0.6:1.6") from None
         given_values = checked(values(given.set, model.parameters, "--set"), model.parameters)
         wanted = {p: v for p, v in start.items() if p in model.parameters} | given_values
+        refuse_softening(model, model.defaults | wanted, given_values)
         material = Material(model, model.defaults | wanted, within)
         written = write_figures(material, given.out / given.plot)
         record = {"energy": given.plot, "values": material.values, "files": {n: str(p) for n, p in written.items()}}

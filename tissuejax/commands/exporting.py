@@ -49,6 +49,12 @@ solver can; elsewhere it gets a bulk modulus of 1000 shear moduli, said in the c
     def run(self, given: argparse.Namespace) -> Reply:
         """Convert, write, say what was refused."""
         of = known(given)
+        if of.assumed:
+            first = of.assumed[0]
+            example = f"{first}={of.values[first]:g} {of.model.parameters[first].unit}".removesuffix(" 1")
+            raise InputError(
+                f'a card needs all constants; missing {", ".join(of.assumed)}: give them, e.g. --set "{example}"'
+            )
         density = None if given.density is None else quantity(given.density, "kg/m^3", "--density")
         bulk = None if given.bulk is None else quantity(given.bulk, "Pa", "--bulk")
         name = given.name or of.name

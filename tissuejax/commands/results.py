@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from tissuejax.commands.arguments import values as valued
 from tissuejax.energies.published import published
 from tissuejax.errors import InputError
 from tissuejax.model import Model
-from tissuejax.parameters import checked
+from tissuejax.parameters import checked, under
 
 NOT_A_RESULT = "not a result.json of `tissuejax fit`"
 FAULTS = (ValueError, KeyError, TypeError, AttributeError)  # of reading a record that is another's
@@ -24,12 +25,21 @@ class Known:
         name: of the sample or the material.
         model, values: what it is.
         record: the result it came from, {} for a material that was never fitted.
+        assumed: constants of the energy that nobody gave: the catalogue's typical values.
     """
 
     name: str
     model: Model
     values: dict[str, float]
     record: dict
+    assumed: tuple[str, ...] = ()
+
+    @property
+    def said(self) -> list[str]:
+        """A sentence on constants that nobody gave."""
+        declared = self.model.parameters
+        told = ", ".join(f"{p} = {self.values[p]:.4g} {declared[p].unit}".removesuffix(" 1") for p in self.assumed)
+        return [f"not given, so the catalogue's typical values: {told} (--set)"] if told else []
 
 
 def add_source(parser: argparse.ArgumentParser) -> None:
@@ -67,7 +77,27 @@ def known(given: argparse.Namespace) -> Known:
         )
         found = Known(given.energy, model, dict(model.defaults), {})
     changed = valued(given.set, found.model.parameters, "--set")
-    return Known(found.name, found.model, found.values | checked(changed, found.model.parameters), found.record)
+    rooms = ("energy.", "volumetric.")
+    own = [p for p in found.model.parameters if p.startswith(rooms)] if given.energy is not None else []
+    assumed = tuple(p for p in own if p not in changed)
+    values = found.values | checked(changed, found.model.parameters)
+    refuse_softening(found.model, values, changed)
+    return Known(found.name, found.model, values, found.record, assumed)
+
+
+def refuse_softening(model: Model, values: Mapping[str, float], told: Mapping[str, float]) -> None:
+    """Refuse constants that give a material without a positive shear modulus at rest.
+
+    Raises:
+        InputError: which were told, and the modulus.
+    """
+    named = [p for p in told if p.startswith("energy.")]
+    modulus = float(model.energy.initial_shear_modulus(under("energy", values)))
+    if named and not modulus > 0:
+        raise InputError(
+            f"{', '.join(f'{p} = {told[p]:g}' for p in named)}: the shear modulus at rest would be {modulus:.4g} Pa; "
+            "it must be positive, or the material has no shape of its own"
+        )
 
 
 def read_result(path: Path) -> Known:
@@ -124,5 +154,5 @@ def effects_of(record: dict) -> list[str]:
     found = []
     for name in record["effects"]:
         terms = sum(p.startswith(f"effects.{name}.g") for p in record["parameters"])
-        found.append(f"{name}-{terms}" if name == "viscoelasticity" and terms != 2 else name)
+        found.append(f"{name}-{terms}" if name == "viscoelasticity" and terms != 1 else name)
     return found

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from tissuejax.commands.arguments import seed
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.outputs import add_out
 from tissuejax.commands.results import Known, add_source, known
@@ -66,7 +67,7 @@ then a placeholder, 1e-6 of the peak.
         parser.add_argument("--radius", metavar="VALUE", help='of the tip, e.g. "8 mm"')
         add_output(parser)
         parser.add_argument("--noise", metavar="VALUE", help='noise to add, e.g. "20 Pa" or "3 mN"')
-        parser.add_argument("--seed", type=int, default=0, help="of the noise (default 0)")
+        parser.add_argument("--seed", type=seed, default=0, help="of the noise (default 0)")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Make the recording, predict it, write it."""
@@ -84,6 +85,8 @@ then a placeholder, 1e-6 of the peak.
             sample = Sample(f"{body.name}-simulated", {"probing": made}, body.geometry, body.density, body.gravity)
         unit = "N" if given.body else "Pa"
         noise = None if given.noise is None else quantity(given.noise, unit, "--noise")
+        if noise is not None and noise < 0:
+            raise InputError(f"--noise {given.noise}: a standard deviation, 0 or more")
         out = given.out or Path("out") / sample.name
         return simulated(of, sample, tuple(sample.recordings), given, out, noise)
 
@@ -123,7 +126,7 @@ def simulated(
     target = out / f"{sample.name}.h5"
     if target.exists() and not given.force:
         raise InputError(f"{target}: is there already; name another folder with --out, or give --force to overwrite it")
-    assumed: list[str] = []
+    assumed = of.said
     probings = [n for n in names if sample.recordings[n].experiment == "probing"]
     options = {}
     model, values = Model(of.model.energy, of.model.volumetric, of.model.effects), of.values
@@ -134,7 +137,7 @@ def simulated(
             constants = {n.removeprefix("energy."): v for n, v in values.items() if n.startswith("energy.")}
             K = BULK * float(model.energy.initial_shear_modulus(constants))
             values = values | {"volumetric.K": K}
-            assumed = [f"the body was taken as nearly incompressible, K = {K:.4g} Pa ({BULK} shear moduli)"]
+            assumed += [f"the body was taken as nearly incompressible, K = {K:.4g} Pa ({BULK} shear moduli)"]
     made = predictor(model, sample, names, **options)
     values = {p: v for p, v in values.items() if p in made.model.parameters or p in made.model.declared}
     missing = [p for p, d in made.model.parameters.items() if d.each and p not in values]

@@ -8,6 +8,7 @@ stiffness of its tissue: the constants that another test found are stated likewi
 from collections.abc import Mapping, Sequence
 
 from tissuejax.diagnosis.bench import Bench, Candidate
+from tissuejax.effects.catalogue import declared as declared_of
 from tissuejax.effects.catalogue import effects
 from tissuejax.errors import InputError, unknown
 from tissuejax.units import quantity
@@ -50,7 +51,7 @@ def _number(item: str, name: str, parameter: str, text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        units = {} if name in TISSUE else {d.name: d.unit for d in effects()[name]().parameters}
+        units = {} if name in TISSUE else {k: d.unit for k, d in declared_of(name).items()}
         unit = units.get(parameter, "Pa" if name in TISSUE else "1")
     try:
         return quantity(text, unit, item.partition("=")[0])
@@ -77,7 +78,7 @@ def tell(bench: Bench, known: Known) -> None:
     for name, values in effects_of(known).items():
         forms = [c for c in bench.candidates.values() if c.name == name]
         given = {f"effects.{name}.{p}": v for p, v in values.items()}
-        declared = {d.name for d in effects()[name]().parameters}
+        declared = set(declared_of(name))
         for path, p in zip(given, values, strict=True):
             if path not in bench.start and p not in declared:
                 raise unknown(f"parameter of {name}", p, sorted(declared))

@@ -4,6 +4,7 @@ from tissuejax import effects as package
 from tissuejax.effects.effect import Effect
 from tissuejax.errors import InputError
 from tissuejax.families import lookup, members
+from tissuejax.parameters import Parameter
 
 MOST_TERMS = 5
 
@@ -16,7 +17,7 @@ def effects(kind: str | None = None) -> dict[str, type[Effect]]:
 def effect(name: str, **options) -> Effect:
     """The effect called `name`, e.g. "softening"; `options` are its fields.
 
-    A number after the name is that of its terms: "viscoelasticity-3" has three relaxation times.
+    A number after the name is that of its terms: "viscoelasticity-3" has three relaxation times, without it one.
 
     Raises:
         InputError: no such effect; the nearest names are offered.
@@ -37,3 +38,10 @@ def suited(name: str, kind: str, **options) -> Effect:
         InputError: no such effect, or one that can't act there.
     """
     return lookup("effect", name, effects(kind))(**options)
+
+
+def declared(name: str) -> dict[str, Parameter]:
+    """Parameters that the effect called `name` can have, by name; of a series those of its longest."""
+    cls = effects()[name]
+    series = isinstance(getattr(cls, "terms", None), int)
+    return {d.name: d for d in (cls(terms=MOST_TERMS) if series else cls()).parameters}

@@ -55,7 +55,7 @@ class Viscoelasticity(Effect):
     needs: ClassVar[str] = "rates"
     source: ClassVar[str] = "Fung 1993, sec. 7.6; Simo and Hughes 1998, sec. 10.3"
     order: ClassVar[int] = 2
-    terms: int = 2
+    terms: int = 1
     shortest: float = 0.1
     longest: float = 100.0
     moduli: bool = False

@@ -9,6 +9,7 @@ from tissuejax.errors import InputError
 from tissuejax.experiments.catalogue import experiment
 from tissuejax.recordings.recording import Channel, Recording
 
+MOST = 10**7  # samples: beyond, one recording fills a memory
 UNKNOWN_NOISE = 1e-6  # share of the peak written as the noise of a prediction, since a recording file must have one
 
 
@@ -28,6 +29,10 @@ def corners(text: str, rate: float) -> tuple[Float[np.ndarray, " n"], Float[np.n
         raise InputError(f'path "{text}": wanted are corners TIME:VALUE, such as "0:1 10:1.3 40:1.3"') from None
     if len(time) < 2 or not (np.diff(time) > 0).all():
         raise InputError(f'path "{text}": wanted are two corners or more, at increasing times')
+    if np.ptp(time) * rate > MOST:
+        raise InputError(
+            f'path "{text}" at {rate:g} Hz: {np.ptp(time) * rate:.3g} samples, at most {MOST:.0e}; lower --rate'
+        )
     fine = np.linspace(time[0], time[-1], max(2, int(round(np.ptp(time) * rate)) + 1))
     each = np.stack([np.interp(fine, time, column) for column in drive.T], axis=-1)
     return fine, each[:, 0] if each.shape[1] == 1 else each

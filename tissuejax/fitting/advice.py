@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tissuejax.estimation.level import NEGLIGIBLE
 from tissuejax.estimation.stability import sentence
 from tissuejax.fitting.memory import begun_loaded, times
 from tissuejax.parameters import begun
@@ -97,11 +98,18 @@ def numerics_sentence(found: "Fit") -> str:
 def beyond_noise(found: "Fit") -> dict[str, float]:
     """Channels whose misfit exceeds the recorded noise, and how many times: the one test of "something is missing".
 
-    A noise level estimated from few samples may be a quarter too low, hence the margin of `MISFIT`.
+    A noise level estimated from few samples may be a quarter too low, hence the margin of `MISFIT`; and as in a
+    judgement, what is left beyond the noise counts from `NEGLIGIBLE` of the largest value on.
     """
-    groups = found.problem.noise.groups
-    times = {k: math.sqrt(s.chi2_per_sample) for k, s in found.channels.items() if k not in groups}
-    return {k: t for k, t in times.items() if t**2 > MISFIT}
+    groups, recordings = found.problem.noise.groups, found.problem.predictor.sample.recordings
+    times = {}
+    for key, s in found.channels.items():
+        name, channel = key.split("/", 1)
+        top = float(np.nanquantile(np.abs(recordings[name].channels[channel].values), 0.98))
+        rest = s.rmse * math.sqrt(max(0.0, 1 - 1 / max(s.chi2_per_sample, 1e-12)))
+        if key not in groups and s.chi2_per_sample > MISFIT and (channel == "markers" or rest > NEGLIGIBLE * top):
+            times[key] = math.sqrt(s.chi2_per_sample)
+    return times
 
 
 def suspect(found: "Fit") -> list[str]:

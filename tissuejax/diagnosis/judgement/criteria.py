@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tissuejax.estimation.level import NEGLIGIBLE
+
 
 @dataclass(frozen=True)
 class Criteria:
@@ -66,7 +68,7 @@ class Criteria:
     change: float = 0.3
     rig: float = 0.1
     shape: float = float(np.log(5.0))
-    negligible: float = 0.005
+    negligible: float = NEGLIGIBLE
     unseen: float = 0.5
     misstated: float = 2.0
     named: float = 0.5
