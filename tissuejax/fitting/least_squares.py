@@ -26,7 +26,7 @@ from tissuejax.estimation.stability import recorded_stability
 from tissuejax.estimation.transforms import chained
 from tissuejax.fitting.advice import warnings_of
 from tissuejax.fitting.gradient_descent import GRADIENT_METHODS, gradient_descent
-from tissuejax.fitting.idle import roused, terms, woken
+from tissuejax.fitting.idle import roused, terms, woken, woken_modulus
 from tissuejax.fitting.options import Search
 from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
@@ -252,8 +252,9 @@ def _scatter(problem: Problem, r: np.ndarray, jacobian: np.ndarray, memory: Seri
 def _awake(problem: Problem, best: Ended, options) -> tuple[Ended, int]:
     """Go on from `best` with idle terms woken (`fitting.idle`), one at a time as long as that gains."""
     n = 0
-    for _ in range(sum(len(series) for series in terms(problem))):
-        start = woken(problem, problem.values(best.y))
+    for _ in range(sum(len(series) for series in terms(problem)) + len(problem.moduli)):
+        values = problem.values(best.y)
+        start = woken(problem, values) or woken_modulus(problem, values)
         if start is None:
             break
         again = descend(problem, start, **options)
