@@ -70,6 +70,8 @@ class Projection(LeastSquares):
             return forecast
         r, jacobian = self._linearised(x)
         if not _finite(r, jacobian):
+            if not np.isfinite(self.best):  # a matrix of no stiffness may have no equilibrium beside its fibres
+                raise NotSeparable
             return np.full_like(r, np.inf)
         if np.linalg.norm(r - forecast) > LINEAR * (np.linalg.norm(forecast) + 1e-3 * np.sqrt(len(r))):
             raise NotSeparable
