@@ -138,3 +138,34 @@ def test_each_template_is_a_side_file_that_reads(kind, tmp_path, capsys):
     (tmp_path / "my.toml").write_text(text)
     (recording,) = read(tmp_path / "my.toml").recordings.values()
     assert recording.experiment == ("uniaxial" if kind in ("tension", "compression") else kind)
+
+
+def test_a_normal_force_is_no_load_of_a_shear_test(tmp_path):
+    rows = np.stack([T, 2 * U, F, 0.1 + T], axis=1)
+    (tmp_path / "my.csv").write_bytes(table(["time,shear strain,shear stress,normal force", "s,%,Pa,N"], rows))
+    assert main(["import", str(tmp_path / "my.csv")]) == 0
+    r = read(tmp_path / "my.toml").recordings["r1"]
+    assert r.experiment == "simple-shear"
+    np.testing.assert_allclose(r.inputs["shear"], 0.02 * U, rtol=1e-5)
+    np.testing.assert_allclose(r.channels["nominal_stress"].values, F, rtol=1e-5)
+    (tmp_path / "press.csv").write_bytes(table(["time (s),shear strain,normal force (N)"], rows[:, [0, 1, 3]]))
+    assert main(["import", str(tmp_path / "press.csv")]) == 2
+
+
+def test_a_rheometers_oscillation_is_a_shear_test(tmp_path, capsys):
+    names = ["osc. stress\tangular frequency\ttime\tstrain\tG'", "Pa\trad/s\ts\t%\tPa"]
+    rows = np.stack([F, 0 * T + 1, T, U, 0 * T + 100], axis=1)
+    (tmp_path / "gel.txt").write_bytes(table(names, rows, "\t", above="Geometry\t40mm parallel plate\n"))
+    assert main(["import", str(tmp_path / "gel.txt")]) == 0
+    assert "amplitudes" in capsys.readouterr().out
+    r = read(tmp_path / "gel.toml").recordings["r1"]
+    assert r.experiment == "simple-shear"
+    np.testing.assert_allclose(r.inputs["shear"], 0.01 * U, rtol=1e-5)
+    np.testing.assert_allclose(r.channels["nominal_stress"].values, F, rtol=1e-5)
+
+
+def test_names_wider_than_the_rows_count_from_the_left(tmp_path):
+    (tmp_path / "my.csv").write_bytes(table(["time (s),strain,stress (kPa),s"], ROWS * [1, 0.1, 1]))
+    assert main(["import", str(tmp_path / "my.csv")]) == 0
+    r = read(tmp_path / "my.toml").recordings["r1"]
+    np.testing.assert_allclose(r.channels["nominal_stress"].values, 1e3 * F, rtol=1e-5)

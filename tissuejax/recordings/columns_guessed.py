@@ -17,6 +17,8 @@ USUAL |= {"angle": "deg"}
 # The better of several: engineering before true, stress and strain as given before force over an area not known.
 PREFERRED = ("stretch", "strain", "length", "displacement", "true_strain", "shear", "angle", "radial_stretch")
 LOADS = ("nominal_stress", "force", "true_stress")
+# What a shear rig or a rheometer presses with: it stands across the sheared planes and is no load of the test.
+_ACROSS = re.compile(r"\b(normal|axial|normalkraft|axialkraft|fn|fz|thrust)\b")
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,8 @@ def _one(name: str, unit: str, values: np.ndarray, meanings: Mapping[str, str], 
                 label = " ".join(words[:k])
                 break
     if not quantity or quantity not in QUANTITIES:
+        return Guessed(name, "", unit)
+    if shear and quantity in STRESS and _ACROSS.search(text):
         return Guessed(name, "", unit)
     quantity = IN_SHEAR.get(quantity.replace("nominal_", ""), quantity) if shear else quantity
     if quantity == "displacement" and unit and _fits(unit, "rad") and not _fits(unit, "1"):

@@ -30,6 +30,7 @@ _NAME_KEYS = (
 )
 _PRESSED = re.compile(r"compress|druck|stauch", re.I)
 _SHEARED = re.compile(r"shear|scher", re.I)
+_OSCILLATING = re.compile(r"\bosc(illat\w*)?\b")
 
 
 @dataclass(frozen=True)
@@ -184,10 +185,13 @@ def _content(path: Path, format: str) -> tuple[TableExport | None, Exported, dic
     table = whole.tables[0]
     after = table.first + len(table.rows)
     side_by_side = len(text.groups(table)) > 1
-    if len(whole.tables) > 1 or side_by_side or any(line.strip() for line in lines[after:]):
+    wide = len(table.names) - len(text.split(lines[table.first], whole.separator))
+    if len(whole.tables) > 1 or side_by_side or wide > 0 or any(line.strip() for line in lines[after:]):
         kind = export_named("text")
         exported = kind.read(path)
         blocks = f"{len(exported.blocks)} tables" if len(exported.blocks) > 1 else "text after the table"
+        if wide > 0:
+            blocks = f"{wide} more names than cells in a row (the names count from the left)"
         return kind, exported, {}, [f'{blocks} found: read as format = "text"']
     top = table.names_at if table.names_at is not None else table.first
     exported = stacked(path, [table], text.header(lines[:top], whole.separator), decimal=whole.decimal)
@@ -223,6 +227,11 @@ def _experiment(kind: TableExport | None, exported: Exported, words: str) -> tup
     names = [bare(split_unit(n)[0]) for n in exported.units]
     if any(_SHEARED.search(n) for n in names):
         return "simple-shear", "a column speaks of shear: taken as simple shear (--experiment says otherwise)"
+    if any(_OSCILLATING.search(n) for n in names):
+        return "simple-shear", (
+            "a column speaks of oscillation, as rheometers do: taken as simple shear (--experiment says otherwise); "
+            "where a row is a whole oscillation, the curve is one of amplitudes"
+        )
     if any("indentation" in n or "penetration" in n for n in names) or any(
         size_of(k) == "radius" for k in exported.header
     ):

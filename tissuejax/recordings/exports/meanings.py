@@ -15,6 +15,7 @@ _PLACES = (
     "(standard|crosshead|traverse?n?|machine|actuator|grip|axial|linear|digital|absolute|probe|tip|tensile|compressive"
     "|compression)"
 )
+_TURNED = "(osc(illation|illatory)?|shear)"  # a rheometer's words before strain, stress, displacement
 _MOVES = "displacement|disp|extension|travel|position|stroke|elongation|deflection|path|weg"
 
 
@@ -39,6 +40,7 @@ QUANTITY_NAMES: dict[str, str] = {
     ),
     "shear": _any(
         r"(amount of )?shear( strain)?",
+        r"osc(illation|illatory)? (shear )?strain",
         r"gamma",
         r"scherung",
         r"shear strain",
@@ -63,6 +65,7 @@ QUANTITY_NAMES: dict[str, str] = {
     ),
     "nominal_stress": _any(
         r"((engineering|eng|nominal|tensile|compressive|compression|axial) )?stress",
+        rf"{_TURNED} stress",
         r"(1st|first) piola( kirchhoff)?( stress)?",
         r"spannung",
         r"pk1",
