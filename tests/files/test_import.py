@@ -169,3 +169,23 @@ def test_names_wider_than_the_rows_count_from_the_left(tmp_path):
     assert main(["import", str(tmp_path / "my.csv")]) == 0
     r = read(tmp_path / "my.toml").recordings["r1"]
     np.testing.assert_allclose(r.channels["nominal_stress"].values, 1e3 * F, rtol=1e-5)
+
+
+@pytest.mark.parametrize(("dead", "column"), [(1, "Displacement (mm)"), (2, "Force (N)")])
+def test_a_column_that_does_not_move_tells_no_sense(dead, column, tmp_path):
+    rows = ROWS.copy()
+    rows[:, dead] = 0
+    (tmp_path / "my.csv").write_bytes(table(["Time (s),Displacement (mm),Force (N)"], rows))
+    guess = guessed(tmp_path / "my.csv")
+    assert [s for s in guess.said if "sense" in s] == [
+        f"the sense of the load can't be told, because {column!r} does not change: tension counts positive"
+    ]
+    assert not [s for s in guess.said if "fall" in s or "rise" in s]
+
+
+def test_a_time_that_stands_still_is_not_called_running_backwards(tmp_path):
+    rows = ROWS.copy()
+    rows[1::2, 0] = rows[:-1:2, 0]
+    (tmp_path / "my.csv").write_bytes(table(["Time (s),Displacement (mm),Force (N)"], rows))
+    (said,) = (s for s in guessed(tmp_path / "my.csv").said if "time column" in s)
+    assert "stands still at line 3 (two rows at 0)" in said

@@ -15,6 +15,7 @@ from tissuejax.recordings.exports import text
 from tissuejax.recordings.exports.export import BLOCK, Exported, TableExport, export_named, recognised, stacked
 from tissuejax.recordings.exports.meanings import bare, readable, size_of, split_unit
 from tissuejax.recordings.exports.tracked import marker_export
+from tissuejax.recordings.senses import signs_of, zeros_of
 from tissuejax.recordings.side_file import KINEMATIC, SPECIMEN_UNITS
 from tissuejax.units import quantity
 
@@ -128,17 +129,20 @@ def guessed(
     time = chosen_time(found, numbers, blocks)
     fault = ""
     if time is not None and (row := backwards(numbers[time.column], blocks)) is not None:
-        before = columns.text(time.column)[max(0, row - 1)]
+        now, before = columns.text(time.column)[row], columns.text(time.column)[max(0, row - 1)]
+        still = numbers[time.column][row] == numbers[time.column][max(0, row - 1)]
+        way = f"stands still at line {columns.lines[row]} (two rows at {now}" if still else ""
+        way = way or f"runs backwards at line {columns.lines[row]} ({now} after {before}"
         fault = (
-            f"runs backwards at line {columns.lines[row]} ({columns.text(time.column)[row]} after {before}), so it is "
-            "left out and samples are taken as 1 s apart: mend the column and take the line in again"
+            f"{way}), so it is left out and samples are taken as 1 s apart: mend the column and take the line in again"
         )
         said.append(f"the time column {time.column!r} {fault}")
     used = [g for pair, _ in pairs for g in pair] + ([time] if time and not fault else [])
     said += list(dict.fromkeys(g.assumed for g in used if g.assumed))
-    signs, positive, remarks = _signs(pairs, numbers, experiment, positive, bool(_PRESSED.search(words)))
+    signs, positive, remarks = signs_of(pairs, numbers, experiment, positive, bool(_PRESSED.search(words)))
     said += remarks
-    zeros = _zeros(pairs, numbers, experiment, said)
+    zeros, remarks = zeros_of(pairs, numbers, experiment)
+    said += remarks
     specimen = _needed(pairs, experiment, known)
     empty = ~np.all([np.isfinite(numbers[g.column]) for g in used], axis=0)
     if len(pairs) == 1 and empty.any():
@@ -270,70 +274,6 @@ def _is_size(value: str, size: str) -> bool:
         return quantity(value, SPECIMEN_UNITS[size]) > 0
     except InputError:
         return False
-
-
-def _signs(
-    pairs: list[tuple[list[Guessed], str]],
-    numbers: Mapping[str, np.ndarray],
-    experiment: str,
-    positive: str,
-    pressed: bool,
-) -> tuple[dict[str, int], str, list[str]]:
-    """Sign of each column, which sense counts positive, and what was assumed."""
-    if experiment == "cutting":  # its place and its force are read as they stand, either sign
-        return {}, "tension", []
-    pair = pairs[0][0]
-    motion, load = pair[0], pair[len(pair) // 2]
-    x, y = numbers[motion.column], numbers[load.column]
-    both = np.isfinite(x) & np.isfinite(y)
-    if not both.any():
-        return {}, positive or "tension", []
-    x, y = x[both], y[both]
-    most = int(np.argmax(np.abs(y - y[0])))
-    dx, dy = float(np.sign(x[most] - x[0])), float(np.sign(y[most] - y[0]))
-    if experiment == "probing":
-        signs = {g.column: -1 for g, s in ((motion, dx), (load, dy)) if s < 0}
-        said = [f"{', '.join(map(repr, signs))} falls as the tip goes in: turned round"] if signs else []
-        return signs, "tension", said
-    if positive or experiment == "simple-shear" or motion.quantity in ("stretch", "length"):
-        return {}, positive or "tension", []
-    if dx * dy < 0:
-        return (
-            {motion.column: -1 if dy < 0 else 1, load.column: 1} if dy < 0 else {motion.column: -1},
-            "tension",
-            [f"load and deformation have opposite signs: {motion.column!r} is turned round, to go with the load"],
-        )
-    if dx > 0 and pressed:
-        return {}, "compression", ["the file speaks of compression and its numbers rise: compression counts positive"]
-    if dx > 0 and experiment == "uniaxial":
-        return (
-            {},
-            "tension",
-            ["load and deformation rise together: taken as tension (--positive compression if pressed)"],
-        )
-    return {}, "tension", ["load and deformation fall together: taken as compression, which counts negative"]
-
-
-def _zeros(
-    pairs: list[tuple[list[Guessed], str]], numbers: Mapping[str, np.ndarray], experiment: str, said: list[str]
-) -> tuple[str, ...]:
-    """Displacements that don't start at zero; what is done about them is added to `said`."""
-    found = []
-    for pair, _ in pairs if experiment != "cutting" else ():
-        for guess in pair:
-            values = numbers[guess.column][np.isfinite(numbers[guess.column])]
-            if guess.quantity not in ("displacement", "force") or not len(values) or not np.ptp(values):
-                continue
-            share = abs(values[0]) / np.ptp(values)
-            if guess.quantity == "displacement" and share > 0.01 and experiment != "probing":
-                found.append(guess.column)
-                said.append(f"{guess.column!r} starts at {values[0]:.4g} {guess.unit}: counted from there")
-            elif guess.quantity == "force" and share > 0.05 and experiment != "probing":
-                said.append(
-                    f"{guess.column!r} starts at {values[0]:.4g} {guess.unit}, not at zero: a preload, or an offset of "
-                    "the cell (then: zero = true in its line)"
-                )
-    return tuple(dict.fromkeys(found))
 
 
 def _needed(pairs: list[tuple[list[Guessed], str]], experiment: str, known: Mapping[str, str]) -> dict[str, str]:
