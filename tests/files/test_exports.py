@@ -254,6 +254,17 @@ def test_biotester_gives_two_stretches(tmp_path):
     np.testing.assert_allclose(r.channels["nominal_stress"].values[-1], [5.5e-3 / 5e-6, 5.7e-3 / 5e-6])
 
 
+def test_an_anton_paar_table_with_its_units_in_a_row_is_an_indentation(tmp_path):
+    (tmp_path / "a.txt").write_text(
+        "Measurement:\tTest1\n\nTime\tPd\tFn\n[s]\t[nm]\t[mN]\n"
+        + "".join(f"0.{k}\t{10 * k}\t0.{k}\n" for k in range(6))
+    )
+    guess = guessed(tmp_path / "a.txt")
+    assert guess.experiment == "probing"
+    ((pair, _),) = guess.pairs
+    assert [(g.column, g.quantity, g.unit) for g in pair] == [("Pd", "displacement", "nm"), ("Fn", "force", "mN")]
+
+
 POINTS = {
     "trc": "PathFileType\t4\t(X/Y/Z)\tx.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\n10\t10\t2\t2\tmm\n"
     "Frame#\tTime\tA\t\t\tB\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n1\t0.0\t1\t2\t3\t4\t5\t6\n2\t0.1\t1.5\t2.5\t3.5\t\t\t\n",

@@ -1,10 +1,15 @@
-"""Anton Paar's (CSM's) indentation testers: text export, tab-separated, "Time [s]  Pd [nm]  Fn [mN]"."""
+"""Anton Paar's (CSM's) indentation testers: text export, tab-separated, "Time [s]  Pd [nm]  Fn [mN]".
 
+The units stand in the names or in a row of their own below them.
+"""
+
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar
 
 from tissuejax.recordings.exports.export import Exported, TableExport, from_text
+from tissuejax.recordings.exports.meanings import split_unit
 
 
 class AntonPaar(TableExport):
@@ -23,7 +28,10 @@ class AntonPaar(TableExport):
 
     def recognises(self, path: Path, head: str) -> bool:
         """By the names of its columns."""
-        return "Pd [" in head and "Fn [" in head
+        lines = [
+            {split_unit(cell.strip(' "'))[0].strip() for cell in re.split(r"[\t;,]", x)} for x in head.splitlines()
+        ]
+        return any({"Pd", "Fn"} <= cells for cells in lines)
 
     def read(self, path: Path) -> Exported:
         """Its table."""
