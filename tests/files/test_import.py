@@ -189,3 +189,61 @@ def test_a_time_that_stands_still_is_not_called_running_backwards(tmp_path):
     (tmp_path / "my.csv").write_bytes(table(["Time (s),Displacement (mm),Force (N)"], rows))
     (said,) = (s for s in guessed(tmp_path / "my.csv").said if "time column" in s)
     assert "stands still at line 3 (two rows at 0)" in said
+
+
+NAMED = {
+    # names of deformation and load -> the side file's quantities
+    "Compression (mm),Load (N)": ("displacement", "force"),
+    "elongation (mm),tension (mN)": ("displacement", "force"),
+    "Tension (%),Tension (kPa)": ("strain", "nominal_stress"),
+    "lambda [-],P [kPa]": ("stretch", "nominal_stress"),
+    "Traversenweg absolut (mm),Standardkraft (N)": ("displacement", "force"),
+    "gauge length (mm),F1 (N)": ("length", "force"),
+    "LVDT (mm),Channel 2 (N)": ("displacement", "force"),
+}
+
+
+@pytest.mark.parametrize("names", NAMED)
+def test_what_columns_are_called(names, tmp_path):
+    (tmp_path / "my.csv").write_bytes(table([f"time (s),{names}"], ROWS + [0, 1, 0]))
+    guess = guessed(tmp_path / "my.csv")
+    ((pair, _),) = guess.pairs
+    assert tuple(g.quantity for g in pair) == NAMED[names]
+    assert any("one column left" in s for s in guess.said) == ("LVDT" in names or "F1" in names)
+
+
+@pytest.mark.parametrize("names", ["LVDT 1 (mm),LVDT 2 (mm),Load (N)", "Extension (mm),G' (kPa),E-modulus (kPa)"])
+def test_what_may_be_several_things_is_asked_for(names, tmp_path, capsys):
+    rows = np.stack([T, U, U, F], axis=1)
+    (tmp_path / "my.csv").write_bytes(table([f"time (s),{names}"], rows))
+    assert main(["import", str(tmp_path / "my.csv"), "--experiment", "equibiaxial"]) == 2
+    assert "--template equibiaxial" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        ("stretch x,stretch y,stress x (kPa),stress y (kPa)", ""),
+        ("stretch_1,stretch_2,stress_1 (kPa),stress_2 (kPa)", ""),
+        ("a,b,c,d", "time s, stretch, stretch, stress kPa, stress kPa"),
+    ],
+)
+def test_two_axes_are_a_biaxial_test(names, told, tmp_path):
+    rows = np.stack([T, 1 + U / 25, 1 + U / 50, F, 0.5 * F], axis=1)
+    (tmp_path / "my.csv").write_bytes(table([f"time (s),{names}"], rows))
+    assert main(["import", str(tmp_path / "my.csv"), *(["--columns", told] if told else [])]) == 0
+    r = read(tmp_path / "my.toml").recordings["r1"]
+    assert r.experiment == "biaxial"
+    np.testing.assert_allclose(r.inputs["stretch"][-1], [1.2, 1.1])
+    np.testing.assert_allclose(r.channels["nominal_stress"].values[-1], [1e3 * F[-1], 500 * F[-1]])
+
+
+def test_tension_and_compression_name_columns_by_their_unit(tmp_path):
+    (tmp_path / "my.csv").write_bytes(table(["t,u,f"], ROWS))
+    (tmp_path / "my.toml").write_text(
+        'file = "my.csv"\nexperiment = "compression"\n[columns]\ncompression = { column = "u", unit = "mm" }\n'
+        'tension = { column = "f", unit = "N", sign = -1 }\n[specimen]\nheight = "25 mm"\narea = "12 mm^2"\n'
+    )
+    r = next(iter(read(tmp_path / "my.toml").recordings.values()))
+    np.testing.assert_allclose(r.inputs["stretch"], 1 - U / 25, rtol=1e-5)
+    np.testing.assert_allclose(r.channels["nominal_stress"].values, F / 12e-6, rtol=1e-5)

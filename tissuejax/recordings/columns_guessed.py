@@ -7,7 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tissuejax.errors import InputError, unknown
-from tissuejax.recordings.exports.meanings import COLUMN_WORDS, IN_SHEAR, bare, quantity_of, split_unit
+from tissuejax.recordings.exports.meanings import (
+    COLUMN_WORDS,
+    IN_SHEAR,
+    bare,
+    quantity_by_unit,
+    quantity_of,
+    split_unit,
+)
 from tissuejax.recordings.side_file import KINEMATIC, QUANTITIES, STRESS
 from tissuejax.units import factor
 
@@ -21,6 +28,13 @@ LOADS = ("nominal_stress", "force", "true_stress")
 _ACROSS = re.compile(r"\b(normal|axial|normalkraft|axialkraft|fn|fz|thrust)\b")
 
 
+# What stands behind a quantity for an axis or a specimen: "stretch x", "stress 2", "force A1".
+_LABEL = re.compile(r"[a-z]?\d{1,3}|[a-z]{1,2}")
+AXES = (("x", "y"), ("1", "2"), ("xx", "yy"), ("11", "22"))
+# Named by its unit alone, such a column is no measured load or deformation.
+_OTHER = re.compile(r"modul|g'|e'|rate|error|std|sd|noise|set ?point|target|command|soll|amplitude|max|min|peak")
+
+
 @dataclass(frozen=True)
 class Guessed:
     """One column understood.
@@ -29,7 +43,8 @@ class Guessed:
         column: its name in the file.
         quantity: one of the side file's quantities, or "".
         unit: as it stands, or assumed.
-        label: what stands before the quantity in the name ("VA1" in "VA1_force_kN"), or "".
+        label: what stands before the quantity in the name ("VA1" in "VA1_force_kN") or behind it ("x" in
+            "stress x"), or "".
         assumed: a sentence on what was taken for granted, or "".
     """
 
@@ -52,6 +67,7 @@ def understood(
         shear: whether the test is known to be a shear test.
     """
     found = [_one(name, unit, numbers[name], meanings, shear) for name, unit in units.items() if name in numbers]
+    found = _left_over(found, meanings, shear)
     return [_ratio(g, found, numbers) if g.quantity == "strain" and g.assumed else g for g in found]
 
 
@@ -79,6 +95,30 @@ def told(columns: Sequence[str], names: Sequence[str]) -> list[Guessed]:
     return found
 
 
+def _left_over(found: list[Guessed], meanings: Mapping[str, str], shear: bool) -> list[Guessed]:
+    """Where no column names a load, or none a deformation: the one column left whose unit says that it may be it."""
+    for group, names in ((STRESS, ("force", "nominal_stress")), (KINEMATIC, ("displacement", "strain"))):
+        if any(g.quantity in group for g in found):
+            continue
+        free = [g for g in found if not g.quantity and g.unit and quantity_by_unit(g.unit) in names]
+        texts = {g.column: bare(split_unit(g.column)[0]) for g in free}
+        free = [
+            g
+            for g in free
+            if texts[g.column] not in meanings
+            and not _OTHER.search(texts[g.column])
+            and not (shear and _ACROSS.search(texts[g.column]))
+        ]
+        if len(free) == 1:
+            quantity = str(quantity_by_unit(free[0].unit))
+            what = "load" if group is STRESS else "deformation"
+            said = f"{free[0].column!r} is the one column left with a unit of {quantity.replace('nominal_', '')} "
+            said += f"({free[0].unit}): taken as the {what}"
+            taken = replace(free[0], quantity=IN_SHEAR.get(quantity, quantity) if shear else quantity, assumed=said)
+            found = [taken if g is free[0] else g for g in found]
+    return found
+
+
 def _ratio(strain: Guessed, found: Sequence[Guessed], numbers: Mapping[str, np.ndarray]) -> Guessed:
     """A strain taken as percent is a ratio after all if a column of true strain says ln(1 + strain)."""
     for other in found:
@@ -103,6 +143,8 @@ def _one(name: str, unit: str, values: np.ndarray, meanings: Mapping[str, str], 
             if quantity:
                 label = " ".join(words[:k])
                 break
+        if not quantity and len(words) > 1 and _LABEL.fullmatch(words[-1]):
+            quantity, label = quantity_of(" ".join(words[:-1]), unit), words[-1]
     if not quantity or quantity not in QUANTITIES:
         return Guessed(name, "", unit)
     if shear and quantity in STRESS and _ACROSS.search(text):
@@ -140,11 +182,36 @@ def chosen_time(found: Sequence[Guessed], numbers: Mapping[str, np.ndarray], blo
     return next((g for g in times if backwards(numbers[g.column], blocks) is None), times[0] if times else None)
 
 
+_TOLD = {
+    "biaxial": "time s, stretch, stretch, stress kPa, stress kPa",
+    "simple-shear": "time s, shear, stress kPa",
+    "equibiaxial": "time s, stretch, stress kPa",
+}
+
+
 def backwards(values: np.ndarray, blocks: np.ndarray) -> int | None:
     """The first row at which a time doesn't increase within its block, or None."""
     seen = np.flatnonzero(np.isfinite(values))
     bad = np.flatnonzero((np.diff(values[seen]) <= 0) & (blocks[seen][1:] == blocks[seen][:-1]))
     return int(seen[bad[0] + 1]) if len(bad) else None
+
+
+def two_axes(found: Sequence[Guessed], plainly: bool = False) -> bool:
+    """Whether columns are of a biaxial test: two deformations of one quantity and two loads of one, of both axes.
+
+    Args:
+        found: the columns understood.
+        plainly: whether two of each are enough, because the user told what they are.
+    """
+    axes = []
+    for group in (KINEMATIC, STRESS):
+        for quantity in dict.fromkeys(g.quantity for g in found if g.quantity in group):
+            two = [g for g in found if g.quantity == quantity]
+            axis = tuple(g.label or bare(split_unit(g.column)[0]).split()[-1] for g in two)
+            if len(two) == 2 and (plainly or axis in AXES):
+                axes.append(() if plainly else axis)
+                break
+    return len(axes) == 2 and axes[0] == axes[1]
 
 
 def chosen_pairs(found: Sequence[Guessed], experiment: str, sizes: Sequence[str]) -> list[tuple[list[Guessed], str]]:
@@ -163,8 +230,8 @@ def chosen_pairs(found: Sequence[Guessed], experiment: str, sizes: Sequence[str]
         there = ", ".join(repr(g.column) for g in found)
         raise InputError(
             f"found no column of {missing} among {there}: write the side file by hand from "
-            "`tissuejax import --template uniaxial`, or say what the columns are, in their order "
-            '(--columns "time s, displacement mm, force N"; "-" for one that is not used)'
+            f"`tissuejax import --template {experiment or 'uniaxial'}`, or say what the columns are, in their order "
+            f'(--columns "{_TOLD.get(experiment, "time s, displacement mm, force N")}"; "-" for one that is not used)'
         )
     if experiment == "biaxial":
         return [(_axes(motions) + _axes(loads), "")]

@@ -8,7 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from tissuejax.errors import InputError
-from tissuejax.recordings.columns_guessed import Guessed, backwards, chosen_pairs, chosen_time, told, understood
+from tissuejax.recordings.columns_guessed import (
+    Guessed,
+    backwards,
+    chosen_pairs,
+    chosen_time,
+    told,
+    two_axes,
+    understood,
+)
 from tissuejax.recordings.cutting_table import TISSUE
 from tissuejax.recordings.delimited import Columns, text_lines
 from tissuejax.recordings.exports import text
@@ -105,8 +113,8 @@ def guessed(
     kind, exported, reading, said = _content(path, format)
     columns, said = exported.columns, [*said, *exported.assumed]
     words = " ".join([path.stem, *exported.units, *exported.header, *map(str, exported.header.values())])
+    unsaid = not experiment and not (kind and kind.experiment)
     experiment, why = (experiment, "") if experiment else _experiment(kind, exported, words)
-    said += [why] if why else []
     numbers = {n: v for n in exported.units if (v := _numbers(columns, n)) is not None}
     meanings = kind.meanings if kind else {}
     if columns_told:
@@ -116,6 +124,9 @@ def guessed(
             raise InputError(f"{path}: column {words_only[0]!r} holds no numbers; what --columns says doesn't fit")
     else:
         found = understood(exported.units, numbers, meanings, experiment == "simple-shear")
+    if unsaid and experiment == "uniaxial" and two_axes(found, bool(columns_told)):
+        experiment, why = "biaxial", "two deformations and two loads: taken as biaxial (--experiment says otherwise)"
+    said += [why] if why else []
     _refuse_torsion(found, exported, path)
     known = _header_sizes(exported.header) | dict(sizes or {})
     for name, value in known.items():

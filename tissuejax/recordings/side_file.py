@@ -8,7 +8,13 @@ from pathlib import Path
 
 from tissuejax.errors import InputError, unknown
 from tissuejax.recordings.cutting_table import Setup, setup_from
-from tissuejax.recordings.exports.meanings import COLUMN_WORDS, EXPERIMENT_WORDS, SIZE_WORDS
+from tissuejax.recordings.exports.meanings import (
+    BY_UNIT,
+    COLUMN_WORDS,
+    EXPERIMENT_WORDS,
+    SIZE_WORDS,
+    quantity_by_unit,
+)
 from tissuejax.recordings.layouts import LAYOUTS
 from tissuejax.recordings.selection import Selection, selection_from
 from tissuejax.units import factor, quantity
@@ -247,6 +253,10 @@ def _in_our_words(
     for key, value in table.items():
         # "length" is a quantity of [columns] in its own right and another word for the height in [specimen].
         name = key if key in ours else words.get(key.lower(), key)
+        if words is COLUMN_WORDS and key.lower() in BY_UNIT:
+            first = value[0] if isinstance(value, list) and value else value
+            unit = first.get("unit", "") if isinstance(first, dict) else str(first).partition(" ")[2]
+            name = quantity_by_unit(str(unit)) or key
         if name in found:
             raise InputError(f"{place}.{key}: given twice, {key!r} being another word for {name!r}: keep one")
         found[name] = value

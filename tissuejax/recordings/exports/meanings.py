@@ -76,9 +76,8 @@ QUANTITY_NAMES: dict[str, str] = {
     ),
     "displacement": _any(
         rf"({_PLACES} )?({_MOVES})( z| into surface| \d)?",
-        r"weg",
-        r"standardweg",
-        r"traversenweg",
+        rf"{_TURNED} ({_MOVES})",
+        r"(standard|traversen)?weg( abs(olut)?)?",
         r"traverse( abs(olut)?)?",
         r"verformung",
         r"traverse position",
@@ -100,7 +99,7 @@ QUANTITY_NAMES: dict[str, str] = {
         r"position z",
     ),
     "length": _any(
-        r"(current |specimen |sample |grip )?(length|separation|gap|height)",
+        r"(current |specimen |sample |grip |gauge |gage )?(length|separation|gap|height)",
         r"laenge",
         r"grip to grip separation( at .*)?",
         r"size",
@@ -131,6 +130,8 @@ QUANTITY_NAMES: dict[str, str] = {
         r"drehmoment",
     ),
 }
+# Words that say which way something goes and not what it is: the unit tells. P is a force in N, and a stress in Pa.
+BY_UNIT = ("tension", "compression", "pull", "traction", "zug", "druck", "p")
 # A rheometer's and a shear rig's words, where the kind of test is known to be shear.
 IN_SHEAR = {"strain": "shear", "stress": "nominal_stress"}
 
@@ -191,6 +192,8 @@ EXPERIMENT_WORDS: dict[str, tuple[str, str]] = {
 # Natural words for the keys of [columns] and [specimen].
 COLUMN_WORDS = {
     "load": "force",
+    "gauge_length": "length",
+    "gage_length": "length",
     "extension": "displacement",
     "elongation": "displacement",
     "crosshead": "displacement",
@@ -266,9 +269,24 @@ def split_unit(name: str) -> tuple[str, str]:
 def quantity_of(name: str, unit: str = "") -> str | None:
     """The quantity that a column holds, by its bare name; None where the name says nothing known."""
     text = bare(name)
+    if text in BY_UNIT:
+        return quantity_by_unit(unit)
     for quantity, pattern in QUANTITY_NAMES.items():
         if re.fullmatch(pattern, text) or (unit in ("%",) and re.fullmatch(pattern, f"{text} %")):
             return quantity
+    return None
+
+
+def quantity_by_unit(unit: str) -> str | None:
+    """What a unit alone says of a load or deformation: displacement, force, nominal_stress or strain, or None."""
+    if unit in ("%", "mm/mm", "m/m"):
+        return "strain"
+    for quantity, si in (("displacement", "m"), ("force", "N"), ("nominal_stress", "Pa")):
+        try:
+            factor(unit, si)
+        except (InputError, ValueError):
+            continue
+        return quantity if unit else None
     return None
 
 
