@@ -247,3 +247,45 @@ def test_tension_and_compression_name_columns_by_their_unit(tmp_path):
     r = next(iter(read(tmp_path / "my.toml").recordings.values()))
     np.testing.assert_allclose(r.inputs["stretch"], 1 - U / 25, rtol=1e-5)
     np.testing.assert_allclose(r.channels["nominal_stress"].values, F / 12e-6, rtol=1e-5)
+
+
+STATED = {
+    "on one line": ("# gauge_length = 25 mm, area = 12 mm^2\n", {"height": "25 mm", "area": "12 mm^2"}),
+    "with semicolons": ("Height = 25,5 mm; Diameter = 4 mm\n", {"height": "25.5 mm", "diameter": "4 mm"}),
+    "in cells": ("Initial length (mm),25,Diameter (mm),4\n", {"height": "25 mm", "diameter": "4 mm"}),
+    "in cells with units": ("Width,6,mm,Thickness,2,mm\n", {"width": "6 mm", "thickness": "2 mm", "height": "?"}),
+    "by symbols": ("L0=25 mm\nA0=12 mm^2\n", {"height": "25 mm", "area": "12 mm^2"}),
+    "A0, a length": ("L0=25 mm\nb0=6 mm\na0=2 mm\n", {"height": "25 mm", "width": "6 mm", "thickness": "2 mm"}),
+    "a table": (
+        "Specimen name,L0 (mm),Width (mm),Thickness (mm)\npig-3,25,6,2\n\n",
+        {"height": "25 mm", "width": "6 mm", "thickness": "2 mm"},
+    ),
+}
+
+
+@pytest.mark.parametrize("case", STATED)
+def test_sizes_above_the_table(case, tmp_path):
+    above, sizes = STATED[case]
+    (tmp_path / "my.csv").write_bytes(table(["Time (s),Displacement (mm),Force (N)"], ROWS, above=above.rstrip("\n")))
+    guess = guessed(tmp_path / "my.csv")
+    assert guess.specimen == sizes
+    assert guess.sample == ("pig-3" if case == "a table" else "my")
+    if not guess.lacking:
+        assert main(["import", str(tmp_path / "my.csv")]) == 0
+        (r,) = read(tmp_path / "my.toml").recordings.values()
+        np.testing.assert_allclose(r.inputs["time"], T, atol=1e-4)
+
+
+def test_sizes_that_stand_in_columns(tmp_path):
+    rows = np.concatenate([ROWS, np.tile([6.0, 2.0, 25.0], (len(T), 1))], axis=1)
+    names = ["Time (s),Displacement (mm),Force (N),Width (mm),Thickness,L0 (mm)"]
+    (tmp_path / "my.csv").write_bytes(table(names, rows))
+    guess = guessed(tmp_path / "my.csv")
+    assert guess.specimen == {"height": "25 mm", "width": "6 mm", "thickness": "2 mm"}
+    assert any("'Thickness', which has no unit and is taken as mm" in s for s in guess.said)
+    assert not guess.unused
+    rows[-1, 3] = 5.5
+    (tmp_path / "other.csv").write_bytes(table(names, rows))
+    guess = guessed(tmp_path / "other.csv")
+    assert guess.lacking == ("area",)
+    assert any("'Width (mm)' is not the same in all rows" in s for s in guess.said)

@@ -21,10 +21,11 @@ from tissuejax.recordings.cutting_table import TISSUE
 from tissuejax.recordings.delimited import Columns, text_lines
 from tissuejax.recordings.exports import text
 from tissuejax.recordings.exports.export import BLOCK, Exported, TableExport, export_named, recognised, stacked
-from tissuejax.recordings.exports.meanings import bare, readable, size_of, split_unit
+from tissuejax.recordings.exports.meanings import bare, readable, sizes_of, split_unit
 from tissuejax.recordings.exports.tracked import marker_export
 from tissuejax.recordings.senses import signs_of, zeros_of
 from tissuejax.recordings.side_file import KINEMATIC, SPECIMEN_UNITS
+from tissuejax.recordings.specimen_sizes import column_sizes, stated_sizes
 from tissuejax.units import quantity
 
 _NAME_KEYS = (
@@ -128,7 +129,9 @@ def guessed(
         experiment, why = "biaxial", "two deformations and two loads: taken as biaxial (--experiment says otherwise)"
     said += [why] if why else []
     _refuse_torsion(found, exported, path)
-    known = _header_sizes(exported.header) | dict(sizes or {})
+    standing, of_size, remarks = column_sizes(exported.units, numbers, meanings)
+    said += remarks
+    known = standing | stated_sizes(exported.header) | dict(sizes or {})
     for name, value in known.items():
         if quantity(value, SPECIMEN_UNITS[name], name) <= 0:
             raise InputError(f"{name} = {value!r}: expected a size above zero")
@@ -175,7 +178,7 @@ def guessed(
         zeros=zeros,
         specimen=specimen,
         missing=bool(empty.any()),
-        unused=tuple(n for n in exported.units if n not in {g.column for g in used} and n != BLOCK),
+        unused=tuple(n for n in exported.units if n not in {g.column for g in used} | {BLOCK, *of_size}),
         said=tuple(said),
         machine=kind.machine if kind and kind.name != "text" else "",
     )
@@ -197,11 +200,12 @@ def _content(path: Path, format: str) -> tuple[TableExport | None, Exported, dic
     whole = text.understood(lines)
     if not whole.tables:
         raise InputError(f"{path}: found no table of numbers, expected rows of numbers under a line of column names")
-    table = whole.tables[0]
+    sizes, tables = text.sizes_above(whole.tables)
+    table = tables[0]
     after = table.first + len(table.rows)
     side_by_side = len(text.groups(table)) > 1
     wide = len(table.names) - len(text.split(lines[table.first], whole.separator))
-    if len(whole.tables) > 1 or side_by_side or wide > 0 or any(line.strip() for line in lines[after:]):
+    if len(tables) > 1 or side_by_side or wide > 0 or any(line.strip() for line in lines[after:]):
         kind = export_named("text")
         exported = kind.read(path)
         blocks = f"{len(exported.blocks)} tables" if len(exported.blocks) > 1 else "text after the table"
@@ -209,7 +213,7 @@ def _content(path: Path, format: str) -> tuple[TableExport | None, Exported, dic
             blocks = f"{wide} more names than cells in a row (the names count from the left)"
         return kind, exported, {}, [f'{blocks} found: read as format = "text"']
     top = table.names_at if table.names_at is not None else table.first
-    exported = stacked(path, [table], text.header(lines[:top], whole.separator), decimal=whole.decimal)
+    exported = stacked(path, [table], text.header(lines[:top], whole.separator) | sizes, decimal=whole.decimal)
     reading: dict[str, object] = {"separator": text.NAMES[whole.separator]}
     if whole.decimal != ".":
         reading["decimal"] = whole.decimal
@@ -248,7 +252,7 @@ def _experiment(kind: TableExport | None, exported: Exported, words: str) -> tup
             "where a row is a whole oscillation, the curve is one of amplitudes"
         )
     if any("indentation" in n or "penetration" in n for n in names) or any(
-        size_of(k) == "radius" for k in exported.header
+        "radius" in sizes_of(k) for k in exported.header
     ):
         return "probing", "the file speaks of an indentation: taken as a probing by a ball"
     return "uniaxial", "the kind of test isn't said: taken as uniaxial (--experiment says otherwise)"
@@ -261,30 +265,6 @@ def _refuse_torsion(found: list[Guessed], exported: Exported, path: Path) -> Non
             f"{path}: holds torque over rotation; no experiment here takes the torsion of a bar. If the machine can "
             "export shear stress and shear strain (a rheometer can), export those and import them as simple-shear"
         )
-
-
-def _header_sizes(header: Mapping[str, str]) -> dict[str, str]:
-    """Specimen sizes among a file's key lines, as texts with units."""
-    sizes: dict[str, str] = {}
-    for key, value in header.items():
-        size = size_of(key)
-        if size is None or size in sizes:
-            continue
-        found = re.match(r"\s*([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)\s*([^\s;]*)", value)
-        if not found:
-            continue
-        unit = found[2].strip("()[]") or split_unit(key)[1]
-        text_value = f"{found[1].replace(',', '.')} {unit}"
-        if unit and readable(unit) and _is_size(text_value, size):
-            sizes[size] = text_value.replace("µ", "u")
-    return sizes
-
-
-def _is_size(value: str, size: str) -> bool:
-    try:
-        return quantity(value, SPECIMEN_UNITS[size]) > 0
-    except InputError:
-        return False
 
 
 def _needed(pairs: list[tuple[list[Guessed], str]], experiment: str, known: Mapping[str, str]) -> dict[str, str]:

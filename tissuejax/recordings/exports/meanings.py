@@ -163,6 +163,7 @@ SIZE_NAMES: dict[str, str] = {
     "area": _any(
         r"((specimen|sample|initial|original|cross ?section(al)?) ?)*(area|section|querschnitt|flaeche|cross ?section)",
         r"s0",
+        r"a0",
         r"querschnittsflaeche",
     ),
     "radius": _any(
@@ -290,7 +291,9 @@ def quantity_by_unit(unit: str) -> str | None:
     return None
 
 
-def size_of(key: str) -> str | None:
-    """The specimen size that a header key names, or None."""
+def sizes_of(key: str) -> list[str]:
+    """The specimen sizes that a header key may name: none, mostly one, and two for A0 (thickness or area)."""
     text = bare(split_unit(key)[0])
-    return next((size for size, pattern in SIZE_NAMES.items() if re.fullmatch(pattern, text)), None)
+    # testXpert writes its symbol behind the word: "Probendicke a0".
+    short = re.sub(r"(?<=\w) [a-z]0$", "", text)
+    return [size for size, pattern in SIZE_NAMES.items() if re.fullmatch(pattern, text) or re.fullmatch(pattern, short)]

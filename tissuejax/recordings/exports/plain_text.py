@@ -24,11 +24,13 @@ class PlainText(TableExport):
         """Every table, and each group of columns whose names begin again, numbered from 1 in the column `block`."""
         lines = text_lines(path)
         whole = text.understood(lines)
-        tables = [part for table in whole.tables for part in text.groups(table)]
+        sizes, measured = text.sizes_above(whole.tables)
+        tables = [part for table in measured for part in text.groups(table)]
         if not tables:
             raise InputError(
                 f"{path}: found no table of numbers, expected rows of numbers under a line of column names"
             )
         top = tables[0].names_at if tables[0].names_at is not None else tables[0].first
         assumed = ("separator, decimal sign and names are guessed anew whenever it is read",)
-        return stacked(path, tables, text.header(lines[:top], whole.separator), None, assumed, whole.decimal)
+        header = text.header(lines[:top], whole.separator) | sizes
+        return stacked(path, tables, header, None, assumed, whole.decimal)

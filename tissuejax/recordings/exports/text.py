@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tissuejax.recordings.delimited import grouped, unmarked
-from tissuejax.recordings.exports.meanings import quantity_of, readable, split_unit
+from tissuejax.recordings.exports.meanings import quantity_of, readable, sizes_of, split_unit
 
 CELLS_AND_DECIMALS = (("\t", "."), (";", ","), (";", "."), (",", "."), ("\t", ","), ("|", "."), (" ", "."), (" ", ","))
 NAMES = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "space", "|": "|"}
@@ -128,11 +128,40 @@ def understood(lines: Sequence[str], separator: str | None = None, decimal: str 
     return TextFile(separator, decimal, tuple(found))
 
 
+_PAIR = re.compile(r"[^=:\d][^=:]*(=|:)\s*\S[^=:]*")
+
+
+def _pairs(line: str) -> list[tuple[str, str]]:
+    """Several key lines on one: "L0 = 25 mm, area = 12 mm^2", "Length (mm);25;Diameter (mm);4", "Width;6;mm;Gap;2;mm"."""
+    for mark in (";", "\t", ","):
+        parts = [p.strip().strip('"') for p in line.split(mark)]
+        parts = [p for p in parts if p]
+        if len(parts) > 1 and all(_PAIR.fullmatch(p) for p in parts):
+            halves = [re.split(r"\s*[=:]\s*", p, maxsplit=1) for p in parts]
+            return [(h[0], h[1]) for h in halves]
+        for width in (2, 3):
+            groups = [parts[k : k + width] for k in range(0, len(parts), width)]
+            if len(groups) > 1 and all(_stated(g, width) for g in groups):
+                return [(g[0].rstrip(" :="), " ".join(g[1:])) for g in groups]
+    return []
+
+
+def _stated(cells: Sequence[str], width: int) -> bool:
+    """Whether cells are a name, a number and, of three, its unit."""
+    number = len(cells) == width and any(is_number(cells[1], sign) for sign in (".", ","))
+    return number and not is_number(cells[0]) and (width == 2 or readable(cells[2].strip("()[]")))
+
+
 def header(lines: Sequence[str], separator: str) -> dict[str, str]:
     """Key lines ("Specimen Width (mm);6", "Width: 6 mm", "Width","6","mm", "k (N/m)<tab>0.019") as a dictionary."""
     found: dict[str, str] = {}
     for line in lines:
         if not line.strip():
+            continue
+        line = unmarked(line)
+        if several := _pairs(line):
+            for key, value in several:
+                found.setdefault(key, value)
             continue
         colon = re.match(r"\s*([^:]*[^:\s]):\s+(\S.*)$", line)
         cells = [colon[1], colon[2].strip()] if colon else _stripped(split(line, separator))
@@ -150,6 +179,20 @@ def header(lines: Sequence[str], separator: str) -> dict[str, str]:
             value = f"{value} {cells[2].strip('()[]')}"
         found.setdefault(key, value)
     return found
+
+
+def sizes_above(tables: Sequence[TextTable]) -> tuple[dict[str, str], list[TextTable]]:
+    """What a small table above the data says of the specimen (sizes by name, one row), as key lines; the other tables."""
+    found: dict[str, str] = {}
+    left = []
+    for k, table in enumerate(tables):
+        if k + 1 < len(tables) and len(table.rows) == 1 and any(sizes_of(n) for n in table.names):
+            for name, unit, value in zip(table.names, table.units, table.rows[0], strict=True):
+                key = name if not unit or split_unit(name)[1] else f"{name} ({unit})"
+                found.setdefault(key, value)
+        else:
+            left.append(table)
+    return found, left
 
 
 def _stripped(cells: list[str]) -> list[str]:
