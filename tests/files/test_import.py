@@ -289,3 +289,45 @@ def test_sizes_that_stand_in_columns(tmp_path):
     guess = guessed(tmp_path / "other.csv")
     assert guess.lacking == ("area",)
     assert any("'Width (mm)' is not the same in all rows" in s for s in guess.said)
+
+
+CLOCKS = {
+    "iso": lambda t: f"2024-03-01 12:00:{t:06.3f}",
+    "of day": lambda t: f"9:59:{50 + t:06.3f}" if t < 10 else "10:00:00.000",
+    "over midnight": lambda t: f"23:59:{55 + t:06.3f}" if t < 5 else f"00:00:{t - 5:06.3f}",
+    "german, over midnight": lambda t: (
+        f"31.01.2024 23:59:{55 + t:06.3f}" if t < 5 else f"01.02.2024 00:00:{t - 5:06.3f}"
+    ),
+    "one date in any order": lambda t: f"03/01/2024 1:00:{t:06.3f} PM",
+}
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+def test_times_of_day_are_seconds_from_the_first(clock, tmp_path, capsys):
+    rows = "".join(f"{CLOCKS[clock](t)},{e:.6g},{f:.6g}\n" for t, e, f in zip(T, U / 25, F))
+    (tmp_path / "my.csv").write_text("Timestamp,Strain,Stress (kPa)\n" + rows)
+    assert main(["import", str(tmp_path / "my.csv")]) == 0
+    assert "assumed: 'Timestamp' holds times of day: read as seconds from the first one" in capsys.readouterr().out
+    np.testing.assert_allclose(read(tmp_path / "my.toml").recordings["r1"].inputs["time"], T, atol=1e-3)
+
+
+@pytest.mark.parametrize("cell", ["03/{d:02d}/2024 12:00:00", "day {d}"])
+def test_a_time_that_can_not_be_read_is_said(cell, tmp_path, capsys):
+    rows = "".join(f"{cell.format(d=k % 28 + 1)},{e:.6g},{f:.6g}\n" for k, (e, f) in enumerate(zip(U / 25, F)))
+    (tmp_path / "my.csv").write_text("Time,Strain,Stress (kPa)\n" + rows)
+    assert main(["import", str(tmp_path / "my.csv")]) == 0
+    out = capsys.readouterr().out
+    assert "'Time' can't be read as times" in out
+    assert "samples are taken as 1 s apart" in out
+
+
+def test_what_is_assumed_and_what_is_not_used_is_printed(tmp_path, capsys):
+    rows = np.stack([T, U, F, 20 + 0 * T], axis=1)
+    (tmp_path / "my.csv").write_bytes(table(["Time (s),Displacement (mm),Force (N),Room (degC)"], rows))
+    assert main(["import", str(tmp_path / "my.csv"), "--height", "25mm", "--area", "12mm^2"]) == 0
+    out = capsys.readouterr().out
+    written = (tmp_path / "my.toml").read_text().splitlines()
+    said = [line.removeprefix("# Assumed: ").rstrip(".") for line in written if line.startswith("# Assumed")]
+    assert said
+    assert all(f"assumed: {s}" in out for s in said)
+    assert "not used: Room (degC)" in out

@@ -129,7 +129,9 @@ def _guessed(given: argparse.Namespace) -> Reply:
 def _said(guess: Guess, side: Path, given: argparse.Namespace) -> Reply:
     quoted, table = shlex.quote(str(side)), shlex.quote(str(guess.path))
     lines = [f"{guess.path}: {guess.machine or 'a table'}", *(f"  assumed: {s}" for s in guess.said)]
+    lines += [f"  not used: {', '.join(guess.unused)}"] if guess.unused else []
     record = {"side_file": str(side), "assumed": list(guess.said), "lacking": list(guess.lacking), "remarks": []}
+    record["unused"] = list(guess.unused)
     if guess.lacking:
         options = " ".join(f"--{name} ..." for name in guess.lacking)
         options = options.replace("--area ...", "--area ... (or --diameter ...)")

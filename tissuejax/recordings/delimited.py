@@ -14,6 +14,7 @@ from jaxtyping import Float
 
 from tissuejax.errors import InputError, unknown
 from tissuejax.recordings.checks import refusal
+from tissuejax.recordings.clock import seconds
 
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 MISSING = {"", "nan", "na", "n/a", "null", "-"}
@@ -36,6 +37,15 @@ class Columns:
         if name not in self.cells:
             raise InputError(f"{self.path}: {unknown('column', str(name), self.cells)}")
         return self.cells[name]
+
+    def times(self, name: str | int) -> Float[np.ndarray, " rows"]:
+        """A column of times as numbers; dates and times of day as seconds from the first one, NaN where one is missing.
+
+        Raises:
+            InputError: as `numbers`, where the cells are neither.
+        """
+        counted = seconds(self.text(name))
+        return self.numbers(name) if counted is None else counted
 
     def numbers(self, name: str | int) -> Float[np.ndarray, " rows"]:
         """A column as numbers, NaN where a cell is missing.

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tissuejax.errors import InputError
+from tissuejax.recordings.clock import seconds
 from tissuejax.recordings.columns_guessed import (
     Guessed,
     backwards,
@@ -21,7 +22,7 @@ from tissuejax.recordings.cutting_table import TISSUE
 from tissuejax.recordings.delimited import Columns, text_lines
 from tissuejax.recordings.exports import text
 from tissuejax.recordings.exports.export import BLOCK, Exported, TableExport, export_named, recognised, stacked
-from tissuejax.recordings.exports.meanings import bare, readable, sizes_of, split_unit
+from tissuejax.recordings.exports.meanings import bare, quantity_of, readable, sizes_of, split_unit
 from tissuejax.recordings.exports.tracked import marker_export
 from tissuejax.recordings.senses import signs_of, zeros_of
 from tissuejax.recordings.side_file import KINEMATIC, SPECIMEN_UNITS
@@ -118,6 +119,9 @@ def guessed(
     experiment, why = (experiment, "") if experiment else _experiment(kind, exported, words)
     numbers = {n: v for n in exported.units if (v := _numbers(columns, n)) is not None}
     meanings = kind.meanings if kind else {}
+    clocks, remarks = _clocks(columns, [n for n in exported.units if n not in numbers])
+    numbers |= clocks
+    said += remarks
     if columns_told:
         found = told(columns_told, [n for n in exported.units if n != BLOCK])
         words_only = [g.column for g in found if g.quantity and g.column not in numbers]
@@ -125,6 +129,11 @@ def guessed(
             raise InputError(f"{path}: column {words_only[0]!r} holds no numbers; what --columns says doesn't fit")
     else:
         found = understood(exported.units, numbers, meanings, experiment == "simple-shear")
+        # Behind a time in seconds, if there is one: clocks are often written to the second.
+        found = [g for g in found if g.column not in clocks] + [
+            Guessed(name, "time", "s", "", f"{name!r} holds times of day: read as seconds from the first one")
+            for name in clocks
+        ]
     if unsaid and experiment == "uniaxial" and two_axes(found, bool(columns_told)):
         experiment, why = "biaxial", "two deformations and two loads: taken as biaxial (--experiment says otherwise)"
     said += [why] if why else []
@@ -151,6 +160,8 @@ def guessed(
             f"{way}), so it is left out and samples are taken as 1 s apart: mend the column and take the line in again"
         )
         said.append(f"the time column {time.column!r} {fault}")
+    if time is None:
+        said.append("no column of time was found: samples are taken as 1 s apart")
     used = [g for pair, _ in pairs for g in pair] + ([time] if time and not fault else [])
     said += list(dict.fromkeys(g.assumed for g in used if g.assumed))
     signs, positive, remarks = signs_of(pairs, numbers, experiment, positive, bool(_PRESSED.search(words)))
@@ -238,6 +249,19 @@ def _numbers(columns: Columns, name: str) -> np.ndarray | None:
         return columns.numbers(name)
     except InputError:
         return None
+
+
+def _clocks(columns: Columns, names: Sequence[str]) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Columns of dates and times of day, as seconds; and sentences on times that can't be read."""
+    found, said = {}, []
+    for name in names:
+        values = seconds(columns.text(name))
+        if values is not None:
+            found[name] = values
+        elif quantity_of(split_unit(name)[0]) == "time":
+            first = next((c for c in columns.text(name) if c.strip()), "")
+            said.append(f"{name!r} can't be read as times ({first!r}), so it is not used")
+    return found, said
 
 
 def _experiment(kind: TableExport | None, exported: Exported, words: str) -> tuple[str, str]:

@@ -1,4 +1,4 @@
-"""Specimen sizes that a file states: in its key lines, in a small table above the data, in columns that stay the same."""
+"""Specimen sizes that a file states: in its key lines, in a small table, in columns that stay the same."""
 
 import re
 from collections.abc import Mapping

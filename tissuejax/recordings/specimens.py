@@ -191,7 +191,8 @@ def _from_zero(values: np.ndarray, kind: str, zero: float) -> np.ndarray:
 
 def _numbers(part: Part, columns: Columns, rows: np.ndarray, place: str) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Columns in SI with sign and zero applied, and the rows kept."""
-    raw = {q: np.stack([columns.numbers(c.column)[rows] for c in cs], axis=1) for q, cs in part.columns.items()}
+    read = {q: columns.times if q == "time" else columns.numbers for q in part.columns}
+    raw = {q: np.stack([read[q](c.column)[rows] for c in cs], axis=1) for q, cs in part.columns.items()}
     bad = np.any([~np.isfinite(v).all(axis=1) for v in raw.values()], axis=0)
     if bad.any() and part.missing == "drop":
         raw, rows = {q: v[~bad] for q, v in raw.items()}, rows[~bad]

@@ -15,7 +15,8 @@
     [noise]
     force = "0.02 N"                     # or { column = "sd", unit = "N" }, or "estimate" (as if absent)
 
-`[columns]` holds `time` (without it samples are taken as 1 s apart), one of `stretch`, `strain` (engineering),
+`[columns]` holds `time` (without it samples are taken as 1 s apart; dates and times of day are seconds from the first
+one), one of `stretch`, `strain` (engineering),
 `true_strain`, `radial_stretch`, `length`, `displacement`, `shear`, `angle`, and one of `nominal_stress`, `true_stress`
 (Cauchy), `force`. A column is `{ column, unit, sign = -1, zero = true }`; `zero = 5` takes the mean of the first five
 samples as zero; `column` may be a place from 1. A biaxial test gives lists of two columns. `[specimen]`: `height`,

@@ -132,7 +132,7 @@ _PAIR = re.compile(r"[^=:\d][^=:]*(=|:)\s*\S[^=:]*")
 
 
 def _pairs(line: str) -> list[tuple[str, str]]:
-    """Several key lines on one: "L0 = 25 mm, area = 12 mm^2", "Length (mm);25;Diameter (mm);4", "Width;6;mm;Gap;2;mm"."""
+    """Several key lines on one: "L0 = 25 mm, area = 12 mm^2", "Length (mm);25;Width (mm);4", "Width;6;mm;Gap;2;mm"."""
     for mark in (";", "\t", ","):
         parts = [p.strip().strip('"') for p in line.split(mark)]
         parts = [p for p in parts if p]
@@ -182,7 +182,7 @@ def header(lines: Sequence[str], separator: str) -> dict[str, str]:
 
 
 def sizes_above(tables: Sequence[TextTable]) -> tuple[dict[str, str], list[TextTable]]:
-    """What a small table above the data says of the specimen (sizes by name, one row), as key lines; the other tables."""
+    """What a small table above the data says of the specimen (sizes, one row), as key lines; the other tables."""
     found: dict[str, str] = {}
     left = []
     for k, table in enumerate(tables):
