@@ -39,7 +39,13 @@ BREACHES = {
     "empty table": ("", UNI, ["t.csv", "empty file"]),
     "header only": ("t,l,P\n", UNI, ["t.csv", "rows", "none"]),
     "comments only": ("# a\n\n", UNI, ["t.csv", "empty table"]),
-    "one row": ("t,l,P\n0,1,0\n", UNI, ["1 sample", "at least 2"]),
+    "one row": ("t,l,P\n0,1,0\n", UNI, ["1 sample", "at least 2", "3 to be fitted"]),
+    "height below the displacement": (
+        ROWS,
+        UNI.replace('stretch = { column = "l"', 'displacement = { column = "l", unit = "mm", sign = -1')
+        + '[specimen]\nheight = "0.5 mm"',
+        ["specimen.height", "0.5 mm", "shortens the specimen"],
+    ),
     "short row": (ROWS + "1500,1.3\n", UNI, ["line 5", "2 cells", "expected 3"]),
     "word": (ROWS.replace("1.1", "abc"), UNI, ["line 3", "'l'", "'abc'"]),
     "missing cell": (ROWS.replace("1.1", ""), UNI, ["line 3", "'l'", "nan", "missing"]),

@@ -79,10 +79,12 @@ def test_up_to_the_first_drop(tmp_path):
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ("cycles = 9", "found 5 cycle"),
+        ("cycles = 9", "cycle 9 wanted, found 5 cycle"),
+        ('cycles = "after 6"', "cycle 7 and those after it wanted"),
+        ('cycles = "4-8"', "cycles 4 to 8 wanted"),
         ('cycles = "some"', "expected 'last'"),
         ('phase = "up"', "'loading' or 'unloading'"),
-        ('preload = "9 N"', "never reached"),
+        ('preload = "9 N"', r"9 N is never reached, the largest load is [\d.]+ N"),
         ('preload = "9 mm"', "dimension"),
         ('toe = "5%"', "two loads"),
         ("direction = [0, 0, 0]", "three numbers"),

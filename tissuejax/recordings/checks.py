@@ -75,6 +75,17 @@ def stretches(values: Float[np.ndarray, "n ..."], file: object, item: str) -> No
         raise refusal(file, item, f"stretch {values.min():.6g} (first at index {i})", "stretches above zero", advice)
 
 
+def shorter(displacement: Float[np.ndarray, "n ..."], height: float, file: object) -> None:
+    """Refuse a specimen that is pressed together by its whole height, or by more."""
+    most = float(-np.min(displacement))
+    if most >= height:
+        expected = f"more than the {1e3 * most:.4g} mm by which the displacement shortens the specimen"
+        advice = (
+            "The height is wrong, or the displacement's unit or sign, or it doesn't count from the undeformed state."
+        )
+        raise refusal(file, "specimen.height", f"{1e3 * height:.4g} mm", expected, advice)
+
+
 def distinct(recordings: Mapping[str, Recording] | Iterable[tuple[str, Recording]]) -> None:
     """Refuse two recordings with the same data, whatever their names: it would count one measurement twice.
 

@@ -14,6 +14,12 @@ def stretch_from_displacement(displacement: Series, height: float) -> Series:
     return 1.0 + displacement / height
 
 
+def path_length(motion: Float[np.ndarray, "n ..."]) -> Float[np.ndarray, " n"]:
+    """Length of the way through deformation: the abscissa of a smooth curve where no time was recorded."""
+    steps = np.abs(np.diff(motion.reshape(len(motion), -1), axis=0)).sum(axis=1)
+    return np.concatenate([[0.0], np.cumsum(np.maximum(steps, 1e-12))])
+
+
 def stretch_from_strain(strain: Series) -> Series:
     """1 + e for engineering strain."""
     return 1.0 + strain

@@ -140,8 +140,8 @@ def chosen(
         last = len(cycles) if last is None else (len(cycles) + 1 + last if last < 0 else last)
         if not 1 <= first <= last <= len(cycles):
             raise InputError(
-                f"{place}: cycles: {first} to {last} wanted, found {len(cycles)} cycle(s); change `cycles`, or pick "
-                "rows with `where` if the table counts cycles itself"
+                f"{place}: cycles: {_asked(selection.cycles)} wanted, found {len(cycles)} cycle(s) in the deformation; "
+                "change `cycles`, or pick rows with `where` if the table counts cycles itself"
             )
         mask = np.zeros(len(inside), bool)
         for cycle in cycles[first - 1 : last]:
@@ -154,8 +154,21 @@ def chosen(
             notes.append(f"The {selection.phase} alone is kept.")
         keep[inside[~mask]] = False
     if keep.sum() < 2:
-        raise InputError(f"{place}: {int(keep.sum())} row(s) left by upto, cycles and phase, expected at least 2")
+        raise InputError(
+            f"{place}: {int(keep.sum())} row(s) left by upto, cycles and phase, expected at least 2 to be "
+            "looked at, and 3 to be fitted"
+        )
     return keep, notes
+
+
+def _asked(cycles: tuple[int, int | None] | None) -> str:
+    """What `cycles` asks for, in words."""
+    first, last = cycles or (1, None)
+    if first < 0:
+        return "the last cycle"
+    if last is None:
+        return f"cycle {first} and those after it"
+    return f"cycle {first}" if first == last else f"cycles {first} to {last}"
 
 
 def _phase(x: np.ndarray, cycle: tuple[int, ...], phase: str) -> np.ndarray:
@@ -181,6 +194,7 @@ def start_of(
     preload: float | None,
     toe: tuple[float, float] | None,
     place: str,
+    unit: str = "",
 ) -> tuple[int, float | None, list[str]]:
     """First row kept, and the reading of the deformation that counts as none.
 
@@ -189,6 +203,7 @@ def start_of(
         motion, load: of the rows kept so far.
         preload, toe: loads in the unit of `load`.
         place: for messages.
+        unit: of `load`, for messages.
 
     Raises:
         InputError: a preload that is never reached, or a toe range with fewer than three rows or no slope.
@@ -198,7 +213,8 @@ def start_of(
         over = np.flatnonzero(size >= preload)
         if not len(over):
             raise InputError(
-                f"{place}: preload {selection.preload} is never reached (largest load {size.max():.4g} in SI); lower it"
+                f"{place}: preload: {selection.preload} is never reached, the largest load is {size.max():.4g} {unit}; "
+                "give a smaller one, or check the unit of the load's column"
             )
         first = int(over[0])
         zero = float(motion[first])

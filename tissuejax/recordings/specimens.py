@@ -43,7 +43,7 @@ def recording_from(
     notes = []
     values, rows = _numbers(part, columns, rows, place)
     if len(rows) < 2:
-        raise checks.refusal(place, "rows", f"{len(rows)} sample(s)", "at least 2 samples")
+        raise checks.refusal(place, "rows", f"{len(rows)} sample(s)", "at least 2 to be looked at, and 3 to be fitted")
     timed = "time" in values
     time = values.pop("time", None)
     if not timed:
@@ -80,7 +80,7 @@ def recording_from(
     if load == "force":
         attributes["area"] = _area(sizes, place)
     stress, per_unit = _stress(values[load], load, motion, attributes.get("area"), part, place)
-    abscissa = time if timed else _path(motion)
+    abscissa = time if timed else convert.path_length(motion)
     noise = _noise(part, load, columns, rows, per_unit, abscissa, stress)
     key = "shear" if part.experiment == "simple-shear" else "stretch"
     stated = part.noise.get(kinematic)
@@ -170,10 +170,12 @@ def selected(part: Part, values: Mapping[str, np.ndarray], kinematic: str, load:
     si = QUANTITIES[load]
     preload = quantity(rule.preload, si, "preload") if rule.preload else None
     toe = tuple(quantity(t, si, "toe") for t in rule.toe) if rule.toe else None
-    first, zero, said = start_of(rule, values[kinematic][rows], values[load][rows], preload, toe, place)
+    first, zero, said = start_of(rule, values[kinematic][rows], values[load][rows], preload, toe, place, si)
     rows = rows[first:]
     if len(rows) < 2:
-        raise checks.refusal(place, "preload, toe", f"{len(rows)} row(s) left", "at least 2")
+        raise checks.refusal(
+            place, "preload, toe", f"{len(rows)} row(s) left", "at least 2 to be looked at, and 3 to be fitted"
+        )
     left = {q: v[rows] for q, v in values.items()}
     if kinematic == "length":
         sizes = {**sizes, "height": zero}
@@ -241,7 +243,9 @@ def _motion(part: Part, values: np.ndarray, kind: str, sizes: Sizes, place: str)
             return values / _need(sizes, "height", "displacement into shear", place)
         return np.tan(values) if kind == "angle" else values
     if kind == "displacement":
-        stretch = convert.stretch_from_displacement(values, _need(sizes, "height", "displacement into stretch", place))
+        height = _need(sizes, "height", "displacement into stretch", place)
+        checks.shorter(values, height, place)
+        stretch = convert.stretch_from_displacement(values, height)
     elif kind == "length":
         stretch = values / sizes.get("height", values[0])
     else:
@@ -286,12 +290,6 @@ def _stress(
     if kind == "true_stress" and part.experiment != "simple-shear":
         return convert.nominal_from_true(values, motion), float(np.sqrt(np.mean(motion**-2.0)))
     return values, 1.0
-
-
-def _path(motion: np.ndarray) -> np.ndarray:
-    """Length of the way through deformation: the abscissa of a smooth curve where no time was recorded."""
-    steps = np.abs(np.diff(motion.reshape(len(motion), -1), axis=0)).sum(axis=1)
-    return np.concatenate([[0.0], np.cumsum(np.maximum(steps, 1e-12))])
 
 
 def _said(stated: str | Column, quantity_name: str, columns: Columns, rows: np.ndarray) -> float:
