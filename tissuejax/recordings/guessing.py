@@ -21,7 +21,16 @@ from tissuejax.recordings.columns_guessed import (
 from tissuejax.recordings.cutting_table import TISSUE
 from tissuejax.recordings.delimited import Columns, text_lines
 from tissuejax.recordings.exports import text
-from tissuejax.recordings.exports.export import BLOCK, Exported, TableExport, export_named, recognised, stacked
+from tissuejax.recordings.exports.export import (
+    BLOCK,
+    UNSEEN,
+    Exported,
+    TableExport,
+    by_description,
+    export_named,
+    recognised,
+    stacked,
+)
 from tissuejax.recordings.exports.meanings import bare, quantity_of, readable, sizes_of, split_unit
 from tissuejax.recordings.exports.tracked import marker_export
 from tissuejax.recordings.senses import signs_of, zeros_of
@@ -204,8 +213,7 @@ def _content(path: Path, format: str) -> tuple[TableExport | None, Exported, dic
         )
     kind = export_named(format) if format else recognised(path)
     if kind is not None:
-        public = kind.basis.startswith("its public")
-        basis = " (no real file was at hand: the reader follows its public description)" if public else ""
+        basis = f" ({UNSEEN})" if by_description(kind.basis) else ""
         return kind, kind.read(path), {}, [f"it is an export of {kind.machine}{basis}"] if kind.name != "text" else []
     lines = text_lines(path)
     whole = text.understood(lines)

@@ -16,6 +16,7 @@ from tissuejax.families import members
 from tissuejax.recordings.delimited import Columns, text_lines
 from tissuejax.recordings.exports import text
 
+UNSEEN = "no real file was at hand: the reader follows its public description"
 BLOCK = "block"  # the column that says which block of the file a row stood in, where there are several
 
 
@@ -44,7 +45,7 @@ class TableExport(abc.ABC):
     Class data:
         name: as written in a side file, `format = "..."`.
         machine: what wrote it, for messages.
-        basis: what the reader was tested on, "a real file of ..." or "its public description".
+        basis: what the reader was tested on: "a real file ...", or its public description; see `by_description`.
         experiment: the kind of test that such a file holds; "" where it may be any.
         meanings: column name (bare, see `meanings.bare`) to quantity, where the words of `meanings` don't tell.
     """
@@ -66,6 +67,11 @@ class TableExport(abc.ABC):
         Raises:
             InputError: no table in it, or one cut short.
         """
+
+
+def by_description(basis: str) -> bool:
+    """Whether a reader was written without a real file, by what its basis says: every other begins "a real file"."""
+    return not basis.startswith(("a real file", "the real files"))
 
 
 @functools.cache
