@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tissuejax.errors import InputError
-from tissuejax.recordings.exports.export import BLOCK, recognised, table_exports
+from tissuejax.recordings.exports.export import BLOCK, by_description, recognised, table_exports
 from tissuejax.recordings.exports.tracked import marker_export, marker_exports, tracked
 from tissuejax.recordings.guessing import guessed
 
@@ -277,6 +277,46 @@ POINTS = {
 }
 
 
+@pytest.mark.parametrize(
+    ("name", "content", "unit"),
+    [
+        (
+            "gom",
+            "id;x [mm];y [mm];z [mm];displacement_x [mm];displacement_y [mm];displacement_z [mm]\n"
+            "1;1;2;3;0.5;0.5;0.5\n2;4;5;6;0;0;0\n",
+            "mm",
+        ),
+        (
+            "vic-3d",
+            '"X [mm]","Y [mm]","Z [mm]","U [mm]","V [mm]","W [mm]","exx [1]","sigma [pixel]"\n'
+            "1,2,3,0.5,0.5,0.5,0,0.01\n4,5,6,9,9,9,0,-1\n",
+            "mm",
+        ),
+        (
+            "gom",
+            "index,x [px],y [px],displacement x [px],displacement y [px]\n1,1,2,0.5,0.5\n2,4,5,0,0\n",
+            "pixel",
+        ),
+    ],
+)
+def test_a_table_of_points_is_one_stage(name, content, unit, tmp_path):
+    (tmp_path / "p.csv").write_text(content)
+    assert marker_export(tmp_path / "p.csv").name == name
+    t = tracked(tmp_path / "p.csv")
+    assert t.unit == unit
+    assert t.position.shape == (2, 2, 3)
+    assert t.plane == (unit == "pixel")
+    np.testing.assert_allclose(t.position[1, 0, :2], [1.5, 2.5])
+    assert np.isnan(t.position[1, 1]).all() == (name == "vic-3d")
+
+
+def test_a_biaxial_table_with_displacements_along_axes_is_no_full_field(tmp_path):
+    rows = "".join(f"0.{k},{k},{2 * k},0.{k},0.{k}\n" for k in range(8))
+    (tmp_path / "b.csv").write_text("time (s),displacement x (mm),displacement y (mm),force x (N),force y (N)\n" + rows)
+    assert marker_export(tmp_path / "b.csv") is None
+    assert guessed(tmp_path / "b.csv").experiment == "biaxial"
+
+
 @pytest.mark.parametrize("name", POINTS)
 def test_points_written_from_their_description(name, tmp_path):
     path = tmp_path / ("p.trc" if name == "trc" else "p.csv")
@@ -288,3 +328,21 @@ def test_points_written_from_their_description(name, tmp_path):
     np.testing.assert_allclose(t.position[0, 0], [1, 2, 3])
     np.testing.assert_allclose(t.position[1, 0], [1.5, 2.5, 3.5])
     assert np.isnan(t.position[1, 1]).all() == (name in ("trc", "vic-3d"))
+
+
+def test_every_reader_from_a_description_says_so_and_no_other():
+    families = {**table_exports(), **marker_exports()}
+    described = {name for name, kind in families.items() if by_description(kind.basis)}
+    assert described == {
+        *("instron-wavematrix", "zwick-testxpert", "biomomentum-mach-1", "anton-paar"),
+        *("cellscale-univert", "cellscale-biotester", "trc", "gom", "vic-3d", "matchid"),
+    }
+
+
+def test_an_import_says_that_no_real_file_was_seen(tmp_path):
+    (tmp_path / "w.csv").write_text(
+        '"Total Time (s)","Total Cycles","Position(Linear:Digital Position) (mm)","Load(Linear:Load) (kN)"\n'
+        + "".join(f"0.{k},1,3.{k},0.00{k}\n" for k in range(6))
+    )
+    said = guessed(tmp_path / "w.csv").said
+    assert "it is an export of Instron WaveMatrix (no real file was at hand: the reader follows its public" in said[0]

@@ -14,7 +14,7 @@ import numpy as np
 from tissuejax.errors import InputError
 from tissuejax.recordings.delimited import text_lines
 from tissuejax.recordings.exports import text
-from tissuejax.recordings.exports.meanings import split_unit
+from tissuejax.recordings.exports.meanings import quantity_of, split_unit
 from tissuejax.recordings.exports.tracked import Tracked
 
 
@@ -52,7 +52,7 @@ def field(path: Path, columns: FieldColumns, unit: str = "", assumed: Sequence[s
     if not whole.tables:
         raise InputError(f"{path}: found no table of points")
     table = max(whole.tables, key=lambda t: len(t.rows))
-    bare = [split_unit(n.lstrip("# "))[0].strip() for n in table.names]
+    bare = [_name(n) for n in table.names]
     place = [_find(bare, p) for p in columns.place]
     moved = [_find(bare, p) for p in columns.moved]
     if None in (*place[:2], *moved[:2]):
@@ -60,7 +60,8 @@ def field(path: Path, columns: FieldColumns, unit: str = "", assumed: Sequence[s
             f"{path}: found columns {', '.join(table.names)}, expected coordinates and displacements called like "
             f"{', '.join([*columns.place[:2], *columns.moved[:2]])}"
         )
-    stated = next((u for k, u in enumerate(table.units) if k in (*place, *moved) and u), "") or unit
+    units = [_unit(n, u) for n, u in zip(table.names, table.units, strict=True)]
+    stated = next((u for k, u in enumerate(units) if k in (*place, *moved) and u), "") or unit
     numbers = np.array([[_number(c, whole.decimal) for c in row] for row in table.rows])
     at = np.stack([numbers[:, k] if k is not None else np.zeros(len(numbers)) for k in place], axis=1)
     by = np.stack([numbers[:, k] if k is not None else np.zeros(len(numbers)) for k in moved], axis=1)
@@ -68,8 +69,32 @@ def field(path: Path, columns: FieldColumns, unit: str = "", assumed: Sequence[s
         by = np.where(columns.lost[1](numbers[:, k])[:, None], np.nan, by)
     named = _find(bare, columns.label) if columns.label else None
     labels = [row[named] for row in table.rows] if named is not None else [str(i + 1) for i in range(len(at))]
-    flat = () if place[2] is not None else ("the field is plane: the third coordinate is zero",)
-    return Tracked(None, np.stack([at, at + by]), tuple(labels), stated, (*assumed, *flat))
+    return Tracked(None, np.stack([at, at + by]), tuple(labels), stated, tuple(assumed), place[2] is None)
+
+
+def names_of_field(head: str, columns: FieldColumns, axes: int = 2) -> bool:
+    """Whether a line of a file's beginning names coordinates and their displacements, as a program does, and no time.
+
+    Args:
+        head: the beginning.
+        columns: the program's.
+        axes: how many of x, y and z must be there.
+    """
+    for line in head.splitlines():
+        cells = [_name(c) for c in re.split(r"[;,\t]", line)]
+        if all(_find(cells, p) is not None for p in (*columns.place[:axes], *columns.moved[:axes])):
+            return not any(quantity_of(c) == "time" for c in cells)
+    return False
+
+
+def _name(cell: str) -> str:
+    """A column's name without quotes, comment mark and unit, of which some ("pixel") are no unit to others."""
+    return re.sub(r"\s*\[[^\]]*\]$", "", split_unit(cell.strip(' "#'))[0].strip(' "'))
+
+
+def _unit(name: str, unit: str) -> str:
+    """The unit of a column; pixels are no length, though a printer's "px" is one."""
+    return "pixel" if re.search(r"[\[(](px|pix|pixels?)[\])]", name, re.I) else unit
 
 
 def _find(names: Sequence[str], pattern: str) -> int | None:

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import ClassVar
 
-from tissuejax.recordings.exports.field import FieldColumns, field
+from tissuejax.recordings.exports.field import FieldColumns, field, names_of_field
 from tissuejax.recordings.exports.tracked import MarkerExport, Tracked
 
 _COLUMNS = FieldColumns(
@@ -13,9 +13,9 @@ _COLUMNS = FieldColumns(
         r"(?i)(point |coordinate |coord\.? ?|undeformed )?z",
     ),
     (
-        r"(?i)dx|displacement[ .]?x|x displacement",
-        r"(?i)dy|displacement[ .]?y|y displacement",
-        r"(?i)dz|displacement[ .]?z|z displacement",
+        r"(?i)dx|displacement[ ._]?x|x displacement",
+        r"(?i)dy|displacement[ ._]?y|y displacement",
+        r"(?i)dz|displacement[ ._]?z|z displacement",
     ),
     None,
     r"(?i)(id|index|name|element)",
@@ -32,8 +32,8 @@ class Gom(MarkerExport):
     def recognises(self, path: Path, head: str) -> bool:
         """By its program's name, or displacements called after axes beside coordinates."""
         low = head.lower()
-        return (
-            "gom" in low[:400] and "displacement" in low or any(m in low for m in ("displacement x", "displacement.x"))
+        return ("gom" in low[:400] and "displacement" in low) or (
+            "displacement" in low and names_of_field(head, _COLUMNS)
         )
 
     def read(self, path: Path) -> Tracked:

@@ -57,6 +57,6 @@ class Ncorr(MarkerExport):
         labels = tuple(str(k + 1) for k in range(position.shape[1]))
         assumed = (
             f"the view of camera {camera} alone: points in space need the reconstruction of both",
-            "the third coordinate is zero, y counts downwards",
+            "y counts downwards",
         )
-        return Tracked(None, position, labels, {"pixels": "pixel"}.get(unit, unit), assumed)
+        return Tracked(None, position, labels, {"pixels": "pixel"}.get(unit, unit), assumed, True)

@@ -24,6 +24,7 @@ class Tracked:
         labels: names of the points.
         unit: "m", "mm", ...; "pixel" or "" where the file gives no length.
         assumed: sentences on what the reader took for granted.
+        plane: whether the file holds no third coordinate.
     """
 
     time: Float[np.ndarray, " m"] | None
@@ -31,6 +32,7 @@ class Tracked:
     labels: tuple[str, ...]
     unit: str
     assumed: tuple[str, ...] = ()
+    plane: bool = False
 
 
 class MarkerExport(abc.ABC):

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import ClassVar
 
-from tissuejax.recordings.exports.field import FieldColumns, field
+from tissuejax.recordings.exports.field import FieldColumns, field, names_of_field
 from tissuejax.recordings.exports.tracked import MarkerExport, Tracked
 
 # Capital letters are lengths in space; small ones (x, y, u, v, q, r) are pixels of the two images.
@@ -19,8 +19,7 @@ class Vic3D(MarkerExport):
 
     def recognises(self, path: Path, head: str) -> bool:
         """By its column names on one line."""
-        first = [c.strip(' "') for line in head.splitlines()[:3] for c in line.replace(";", ",").split(",")]
-        return {"X", "Y", "Z", "U", "V", "W"} <= set(first)
+        return names_of_field(head, _COLUMNS, axes=3)
 
     def read(self, path: Path) -> Tracked:
         """Points in the order of the file; millimetres, as the program calibrates."""
