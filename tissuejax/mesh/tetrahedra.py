@@ -40,7 +40,8 @@ def fill(surface: trimesh.Trimesh, edge: float, support: float | None = None) ->
         where = 1e3 * surface.vertices[open_edges[0]].mean(0) if len(open_edges) else np.zeros(3)
         raise InputError(
             f"the surface is not closed: {len(open_edges)} open edges, first near {np.round(where, 1).tolist()} mm; "
-            "fill the holes (trimesh.repair.fill_holes) or mesh the organ by columns"
+            "close them (MeshLab: Filters, Remeshing, Close Holes; Blender: Edit Mode, Mesh, Clean Up, Fill Holes; "
+            "Python: trimesh.repair.fill_holes) and save the surface again, or give a point cloud of its free side"
         )
     diagonal = float(np.linalg.norm(surface.extents))
     # the generator leaves its working surface in the current folder, which is the user's
