@@ -173,3 +173,58 @@ def test_the_template_is_toml_that_the_reader_knows(capsys):
     told = tomllib.loads(capsys.readouterr().out)
     assert set(told) <= set(WHOLE)
     assert set(told["probing"][0]) <= set(PART)
+
+
+def dice(path, moved):
+    """A plane view of two points in pixels, (40, 100) and (60, 100), moved by so much along x."""
+    rows = "".join(f"{k},{x},100,{moved},0,0.01\n" for k, x in enumerate((40, 60)))
+    path.write_text("*** (DICe)\nSUBSET_ID,COORDINATE_X,COORDINATE_Y,DISPLACEMENT_X,DISPLACEMENT_Y,SIGMA\n" + rows)
+
+
+def plane_view(lab, more=""):
+    spec = f'{{ file = "f*.txt", rate = "2Hz", scale = "0.1 mm", noise = "0.1 mm"{more} }}'
+    (lab / "probe.toml").write_text(SLAB.replace('{ file = "markers.csv", noise = "0.1 mm" }', spec))
+    sample = probing_sample(lab / "probe.toml")
+    return sample.recordings["press"].channels["markers"], sample.notes
+
+
+def test_a_first_file_without_displacement_is_the_reference(lab):
+    for k in range(3):
+        dice(lab / f"f{k}.txt", k)
+    markers, notes = plane_view(lab)
+    np.testing.assert_allclose(markers.time, [0, 0.5, 1])
+    np.testing.assert_allclose(markers.values[:, 0, 0], [4e-3, 4.1e-3, 4.2e-3])
+    assert "the first file is the reference" in notes
+    dice(lab / "f0.txt", 0.5)
+    markers, notes = plane_view(lab)
+    np.testing.assert_allclose(markers.time, [0, 0.5, 1, 1.5])
+    assert "the reference is the frame at 0 s, and the first file's state that at 0.5 s" in notes
+
+
+def test_a_plane_view_has_the_height_that_is_told(lab):
+    for k in range(3):
+        dice(lab / f"f{k}.txt", k)
+    markers, notes = plane_view(lab)
+    assert not markers.values[..., 2].any()
+    assert "they lie at z = 0, where the body stands" in notes
+    markers, notes = plane_view(lab, ', z = "20 mm"')
+    np.testing.assert_allclose(markers.values[..., 2], 0.02)
+    assert "its points are put at z = 20 mm" in notes
+    # A camera above, whose y counts downwards, its picture's corner at (-5, 10) mm of the body.
+    own = 'unit = "mm", moving = [[0, 0, 0], [10, 0, 0], [0, 10, 0]], target = [[-5, 10, 20], [5, 10, 20], [-5, 0, 20]]'
+    markers, notes = plane_view(lab, f", registration = {{ {own} }}")
+    np.testing.assert_allclose(markers.values[0], [[-1e-3, 0, 0.02], [1e-3, 0, 0.02]], atol=1e-12)
+    assert "z = 0" not in notes
+    (lab / "probe.toml").write_text(SLAB.replace('noise = "0.1 mm"', 'noise = "0.1 mm", z = "20 mm"'))
+    with pytest.raises(InputError, match="points in space"):
+        probing_sample(lab / "probe.toml")
+
+
+def test_a_surface_with_a_hole_is_refused_in_words_of_its_programs(lab):
+    box = trimesh.creation.box((60, 60, 20))
+    box.update_faces(np.arange(len(box.faces)) > 0)
+    box.export(lab / "open.stl")
+    body = 'surface = "open.stl"\nunit = "mm"\nedge = "8mm"'
+    (lab / "probe.toml").write_text(SLAB.replace('slab = "20mm"\nwidth = "60mm"\nedge = "6mm"', body))
+    with pytest.raises(InputError, match="3 open edges.*MeshLab.*Blender.*Python"):
+        probing_sample(lab / "probe.toml")

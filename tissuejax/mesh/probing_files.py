@@ -20,7 +20,9 @@
 
 Columns are found by their names and units stand in them ("x (mm)", "Fz_N"); `columns = ["px", "py", "pz"]`, `time` and
 `unit` in a table say otherwise, `sign = -1` turns it round, `rate = "10 Hz"` gives times to files without, `every = 5`
-keeps each fifth point of a full field. Image correlation: a list of files, one a frame, makes markers of its points.
+keeps each fifth point of a full field. Image correlation: a list of files, one a frame, makes markers of its points;
+`z = "20 mm"` says how high a plane view lies. A file in a frame of its own has a `registration` of its own in its
+table.
 """
 
 import tomllib
@@ -86,7 +88,7 @@ def _sample(side: Mapping[str, Any], path: Path) -> Sample:
         notes.append(f"Registration by {len(rigid.residuals)} points, the worst {off:.2f} mm off.")
     recordings: dict[str, Recording] = {}
     for part in parts:
-        for recording in _recordings(part, path, rigid, lift, float(np.ptp(made.points[:, 2]))):
+        for recording in _recordings(part, path, rigid, lift, float(np.ptp(made.points[:, 2])), notes):
             if recording.name in recordings:
                 raise InputError(f"probing: two recordings are called {recording.name!r}; give each its own name")
             recordings[recording.name] = recording
@@ -128,7 +130,7 @@ def _rigid(table: Mapping[str, Any]) -> Rigid:
 
 
 def _recordings(
-    part: Mapping[str, Any], path: Path, rigid: Rigid | None, lift: float, height: float
+    part: Mapping[str, Any], path: Path, rigid: Rigid | None, lift: float, height: float, notes: list[str]
 ) -> list[Recording]:
     for key in part:
         if key not in PART:
@@ -142,14 +144,21 @@ def _recordings(
     if not radius > 0:
         raise InputError(f"probing.radius: found {part['radius']!r}, expected the radius of the ball, above zero")
     up = np.array([0.0, 0.0, lift])  # the body was lifted onto z = 0, and what was measured in its frame goes with it
+    own = {k: _own(part[k], rigid) for k in ("probe", "force", "markers") if k in part}
     probe = vector_over_time(part["probe"], path, "probe", "m")
     force = vector_over_time(part["force"], path, "force", "N")
-    channels = {"force": Channel(force.time, _turned(force.values, rigid), "N", _noise(force, "N", "force"))}
+    channels = {"force": Channel(force.time, _turned(force.values, own["force"]), "N", _noise(force, "N", "force"))}
     if "markers" in part:
-        markers = points_over_time(part["markers"], path)
-        moved = markers.values if rigid is None else rigid(markers.values)
+        markers, frame = points_over_time(part["markers"], path), own["markers"]
+        notes += [f"Markers: {sentence}." for sentence in markers.said]
+        if markers.on_support and frame is None:
+            notes.append(
+                "Markers: the view is plane and its height is not said, so they lie at z = 0, where the body stands: "
+                'say it with z = "20 mm" in markers, or bring them to the body with a registration of their own.'
+            )
+        moved = markers.values if frame is None else frame(markers.values)
         channels["markers"] = Channel(markers.time, moved + up, "m", _noise(markers, "m", "markers"))
-    position = probe.values if rigid is None else rigid(probe.values)
+    position = probe.values if own["probe"] is None else own["probe"](probe.values)
     attributes: dict[str, Any] = {"probe/radius": radius}
     if "edge" in part:
         attributes["probe/edge"] = quantity(part["edge"], "m", "probing.edge")
@@ -157,6 +166,14 @@ def _recordings(
         attributes["start"] = quantity(part["start"], "s", "probing.start")
     inputs = {"probe/time": probe.time, "probe/position": position + up}
     return [Recording(str(part.get("recording", "r1")), "probing", inputs, channels, attributes)]
+
+
+def _own(spec: object, rigid: Rigid | None) -> Rigid | None:
+    """The registration of one file, where it has another frame than the rest; else that of all."""
+    own = spec.get("registration") if isinstance(spec, dict) else None
+    if own is not None and not isinstance(own, dict):
+        raise InputError(f"registration: found {own!r}, expected {{ unit = ..., moving = [...], target = [...] }}")
+    return rigid if own is None else _rigid(own)
 
 
 def _turned(values: np.ndarray, rigid: Rigid | None) -> np.ndarray:

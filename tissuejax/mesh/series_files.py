@@ -11,22 +11,44 @@ from jaxtyping import Float
 
 from tissuejax.errors import InputError, unknown
 from tissuejax.recordings.checks import increasing
-from tissuejax.recordings.exports.export import Exported, from_text, recognised
+from tissuejax.recordings.exports.export import UNSEEN, Exported, by_description, from_text, recognised
 from tissuejax.recordings.exports.meanings import bare, quantity_of, split_unit
 from tissuejax.recordings.exports.tracked import Tracked, marker_export
 from tissuejax.recordings.places import resolve
 from tissuejax.units import factor, quantity
 
-SERIES_KEYS = ("file", "columns", "time", "unit", "time_unit", "sign", "noise", "rate", "every", "scale")
+SERIES_KEYS = (
+    "file",
+    "columns",
+    "time",
+    "unit",
+    "time_unit",
+    "sign",
+    "noise",
+    "rate",
+    "every",
+    "scale",
+    "z",
+    "registration",
+)
 
 
 @dataclass(frozen=True)
 class Series:
-    """Values over time, SI; `noise` as the side file tells it, or None."""
+    """Values over time, SI.
+
+    Attributes:
+        time, values: s, and in the unit wanted.
+        noise: as the side file tells it, or None.
+        said: sentences on what the reader took for granted.
+        on_support: whether the points are plane and nobody said how high: they lie at z = 0.
+    """
 
     time: Float[np.ndarray, " n"]
     values: Float[np.ndarray, "n ..."]
     noise: str | None
+    said: tuple[str, ...] = ()
+    on_support: bool = False
 
 
 def vector_over_time(spec: object, side: Path, what: str, si: str) -> Series:
@@ -61,6 +83,8 @@ def points_over_time(spec: object, side: Path) -> Series:
     files = spec["file"] if isinstance(spec["file"], list) else [spec["file"]]
     paths = [p for f in files for p in _found(str(f), side)]
     kind = marker_export(paths[0])
+    said: list[str] = []
+    plane = False
     if kind is None:
         content = _content(paths[0])
         names, count = _triples(content, spec, paths[0])
@@ -68,13 +92,23 @@ def points_over_time(spec: object, side: Path) -> Series:
         time = _time(content, spec, paths[0], len(values))
     else:
         tracked = [kind.read(p) for p in paths]
-        position, time = _frames(tracked, spec, paths)
+        plane = tracked[0].plane
+        said += [f"{kind.program}: {UNSEEN}"] if by_description(kind.basis) else []
+        said += tracked[0].assumed
+        position, time, remarks = _frames(tracked, spec, paths)
+        said += remarks
         unit = str(spec.get("unit", tracked[0].unit))
         values = position * _scale(unit, spec, paths[0])
+    if "z" in spec and not plane:
+        raise InputError("markers.z: found a height for points in space, expected one for a plane view: leave z out")
     step = int(spec.get("every", 1))
     if step < 1:
         raise InputError(f"markers.every: found {step}, expected a whole number from 1")
-    return Series(time, values[:, ::step] * _sign(spec, "markers"), _text(spec, "noise"))
+    values = values[:, ::step] * _sign(spec, "markers")
+    if "z" in spec:
+        values = values + [0.0, 0.0, quantity(spec["z"], "m", "markers.z")]
+        said.append(f"the view is plane, its points are put at z = {spec['z']}")
+    return Series(time, values, _text(spec, "noise"), tuple(said), plane and "z" not in spec)
 
 
 def _checked(spec: object, what: str) -> Mapping[str, Any]:
@@ -181,23 +215,33 @@ def _rate(spec: Mapping[str, Any]) -> float:
 
 def _frames(
     tracked: Sequence[Tracked], spec: Mapping[str, Any], paths: Sequence[Path]
-) -> tuple[Float[np.ndarray, "m k 3"], Float[np.ndarray, " m"]]:
-    """One file with its times, or the reference and deformed states of one file a frame."""
+) -> tuple[Float[np.ndarray, "m k 3"], Float[np.ndarray, " m"], list[str]]:
+    """One file with its times, or the deformed states of one file a frame, behind the reference; and what to say.
+
+    Where the first file is the reference itself, its displacements zero, it is the first frame.
+    """
     first = tracked[0]
     if len(tracked) == 1 and first.time is not None:
-        return first.position, first.time
+        return first.position, first.time, []
     if "rate" not in spec:
         raise InputError(f'{paths[0]}: holds no time; give the frames a second, rate = "5 Hz"')
+    rate = _rate(spec)
+    added = (
+        f"the reference is the frame at 0 s, and the first file's state that at {1 / rate:.4g} s"
+        if np.nan_to_num(first.position[-1] - first.position[0]).any()
+        else "the first file is the reference, the frame at 0 s"
+    )
     if len(tracked) == 1:
-        return first.position, np.arange(len(first.position)) / _rate(spec)
+        said = f"the file's first frame (the reference) is at 0 s, its second at {1 / rate:.4g} s"
+        return first.position, np.arange(len(first.position)) / rate, [said]
     keys = [tuple(p) for p in np.round(first.position[0], 6)]
-    frames = [first.position[0]]
+    frames = [] if added.startswith("the first") else [first.position[0]]
     for path, one in zip(paths, tracked):
         at = {tuple(p): q for p, q in zip(np.round(one.position[0], 6), one.position[-1])}
         frames.append(np.array([at.get(k, np.full(3, np.nan)) for k in keys]))
         if not np.isfinite(frames[-1]).any():
             raise InputError(f"{path}: shares no point with {paths[0]}: all frames must have one reference")
-    return np.stack(frames), np.arange(len(frames)) / _rate(spec)
+    return np.stack(frames), np.arange(len(frames)) / rate, [added]
 
 
 def _scale(unit: str, spec: Mapping[str, Any], path: Path) -> float:
