@@ -166,9 +166,12 @@ def _warned(message, category, filename, lineno, file=None, line=None) -> None:
 
 
 def _refused(name: str, error: TissueError, as_json: bool) -> int:
+    from tissuejax.storage import printable
+
+    said = printable(str(error))  # one sentence in one line, whatever a file is called
     if as_json:
-        print(json.dumps({"status": "error", "error": str(error), "exit_code": error.exit_code}))
-    print(f"tissuejax {name}".strip() + f": {error}", file=sys.stderr)
+        print(json.dumps({"status": "error", "error": said, "exit_code": error.exit_code}))
+    print(f"tissuejax {name}".strip() + f": {said}", file=sys.stderr)
     return error.exit_code
 
 

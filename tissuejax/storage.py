@@ -41,13 +41,18 @@ def replacing(path: str | os.PathLike) -> Iterator[Path]:
     except OSError as error:
         if isinstance(error, ConnectionError):
             raise
-        raise InputError(f"{_shown(path)}: can't be written ({_why(error)})") from error
+        raise InputError(f"{shown(path)}: can't be written ({_why(error)})") from error
 
 
-def _shown(path: Path) -> str:
-    """A path for a message; a name that is too long for a file is too long for a sentence too."""
-    text = str(path)
+def shown(path: str | os.PathLike) -> str:
+    """A path for a message: a line break in a name as \\n, and a name too long for a file too long for a sentence."""
+    text = printable(os.fspath(path))
     return text if len(text) <= 200 else f"{text[:100]}...{text[-40:]}"
+
+
+def printable(text: str) -> str:
+    """A text in one line: line breaks and control characters as Python writes them."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def _why(error: OSError) -> str:

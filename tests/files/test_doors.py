@@ -238,3 +238,51 @@ def test_results_do_not_overwrite_each_other(tmp_path, monkeypatch, capsys):
     assert "--force" in capsys.readouterr().err
     assert main(["diagnose", ELASTIC, "--energy", "neo-hookean", "--out", there]) == 2
     assert main([*argv, "reduced-polynomial-3", "--out", there, "--force"]) == 0
+
+
+@pytest.mark.parametrize("verb", ["import", "inspect"])
+def test_a_link_without_its_target_is_called_that(verb, tmp_path, capsys):
+    (tmp_path / "dang.csv").symlink_to("nowhere.csv")
+    assert main([verb, str(tmp_path / "dang.csv")]) == 2
+    assert "dang.csv: is a link to nowhere.csv, where there is no file" in capsys.readouterr().err
+    assert main([verb, str(tmp_path / "other.csv")]) == 2
+    assert "there are" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("verb", ["import", "inspect"])
+def test_a_name_too_long_is_said_shortly(verb, capsys):
+    assert main([verb, "a" * 300 + ".csv"]) == 2
+    said = capsys.readouterr().err
+    assert "the name is too long for a file" in said
+    assert len(said) < 300
+
+
+def test_a_file_that_can_not_be_read_is_not_called_empty(tmp_path, monkeypatch, capsys):
+    import builtins
+
+    file = tmp_path / "mem.csv"
+    file.touch()
+    real = builtins.open
+
+    def refuse(path, *rest, **named):
+        if str(path) == str(file):
+            raise OSError(5, "Input/output error", str(file))
+        return real(path, *rest, **named)
+
+    monkeypatch.setattr(builtins, "open", refuse)
+    assert main(["import", str(file)]) == 2
+    assert "can't be read (Input/output error)" in capsys.readouterr().err
+
+
+def test_a_line_break_in_a_name_is_shown(tmp_path, capsys):
+    rows = "".join(f"{k},{1 + 0.01 * k},{k}\n" for k in range(20))
+    (tmp_path / "li\nne.csv").write_text("time (s),stretch,stress (kPa)\n" + rows)
+    assert main(["import", str(tmp_path / "li\nne.csv")]) == 0
+    out = capsys.readouterr().out
+    assert "li\\nne.csv: a table" in out
+    assert "li\\nne.toml --out look" in out.replace("' --out", " --out")
+    assert "li\n" not in out
+    assert main(["inspect", str(tmp_path / "li\nne.toml")]) == 0
+    capsys.readouterr()
+    assert main(["inspect", str(tmp_path / "no\npe.toml")]) == 2
+    assert "no\\npe.toml: no such file" in capsys.readouterr().err

@@ -15,9 +15,10 @@ from tissuejax.recordings import cutting_table
 from tissuejax.recordings.files import names, read, write
 from tissuejax.recordings.guessing import Guess, guessed
 from tissuejax.recordings.layouts import layout
+from tissuejax.recordings.places import refuse_no_file
 from tissuejax.recordings.remarks import remarks
 from tissuejax.recordings.side_writing import side_text, slab_text, template
-from tissuejax.storage import write_text
+from tissuejax.storage import printable, shown, write_text
 from tissuejax.units import quantity
 
 # The example at the top of mesh/probing_files.py is the template: there is one text to keep right.
@@ -109,7 +110,7 @@ def _guessed(given: argparse.Namespace) -> Reply:
     from tissuejax.recordings.side_file import experiment_of
 
     path = Path(given.file)
-    _refuse_no_file(path)
+    _refuse_nothing(path)
     kind, sense = experiment_of(given.experiment) if given.experiment else ("", "")
     sizes = {size: getattr(given, size) for size in SIZES if getattr(given, size)}
     columns = given.columns.split(",") if given.columns else ()
@@ -127,15 +128,16 @@ def _guessed(given: argparse.Namespace) -> Reply:
 
 
 def _said(guess: Guess, side: Path, given: argparse.Namespace) -> Reply:
-    quoted, table = shlex.quote(str(side)), shlex.quote(str(guess.path))
-    lines = [f"{guess.path}: {guess.machine or 'a table'}", *(f"  assumed: {s}" for s in guess.said)]
+    quoted, table = _quoted(side), _quoted(guess.path)
+    lines = [f"{shown(guess.path)}: {guess.machine or 'a table'}", *(f"  assumed: {s}" for s in guess.said)]
     lines += [f"  not used: {', '.join(guess.unused)}"] if guess.unused else []
     record = {"side_file": str(side), "assumed": list(guess.said), "lacking": list(guess.lacking), "remarks": []}
     record["unused"] = list(guess.unused)
     if guess.lacking:
         options = " ".join(f"--{name} ..." for name in guess.lacking)
         options = options.replace("--area ...", "--area ... (or --diameter ...)")
-        lines += ["", f"wrote {side}, which still needs: {', '.join(guess.lacking)}. Write them into the lines marked"]
+        needs = f"which still needs: {', '.join(guess.lacking)}. Write them into the lines marked"
+        lines += ["", f"wrote {shown(side)}, {needs}"]
         now = f", or give them now: tissuejax import {table} {options} --force"
         lines.append("FILL IN" + (", and look at what each column is." if guess.experiment == "cutting" else now))
         return Reply(record, "\n".join(lines), 2)
@@ -156,10 +158,10 @@ def _said(guess: Guess, side: Path, given: argparse.Namespace) -> Reply:
         found = remarks(sample)
         record["remarks"] += found
         lines += [f"  note: {remark}" for remark in found]
-    lines += ["", f"wrote {side}"]
+    lines += ["", f"wrote {shown(side)}"]
     if given.out is not None and given.out.suffix in (".h5", ".hdf5"):
         record |= _written(str(side), given.out, given.force)
-        lines.append(f"wrote {given.out}")
+        lines.append(f"wrote {shown(given.out)}")
     lines.append(f"look   tissuejax inspect {quoted} --out look")
     if guess.experiment != "probing":
         lines.append(f"fit    tissuejax fit {quoted} --energy neo-hookean")
@@ -167,7 +169,7 @@ def _said(guess: Guess, side: Path, given: argparse.Namespace) -> Reply:
         body = side.with_name(f"{side.stem}-body.toml")
         _free(body, given.force)
         record["body_file"] = str(write_text(body, slab_text(guess, side.name, given.slab)))
-        lines.append(f"body   tissuejax import {shlex.quote(str(body))}   (a layer of {given.slab}; then fit its .h5)")
+        lines.append(f"body   tissuejax import {_quoted(body)}   (a layer of {given.slab}; then fit its .h5)")
     else:
         told = shlex.join([x for name in SIZES if getattr(given, name) for x in (f"--{name}", getattr(given, name))])
         again = " ".join(filter(None, [f"tissuejax import {table}", told, "--slab 20mm --force"]))
@@ -184,8 +186,8 @@ def _probed(given: argparse.Namespace) -> Reply:
     sample = probing_sample(side)
     write(sample, out)
     found = remarks(sample) + probing_slips(sample)
-    lines = [sample.notes.replace(". ", ".\n"), *(f"note: {remark}" for remark in found), f"wrote {out}"]
-    quoted = shlex.quote(str(out))
+    lines = [sample.notes.replace(". ", ".\n"), *(f"note: {remark}" for remark in found), f"wrote {shown(out)}"]
+    quoted = _quoted(out)
     lines += [f"look   tissuejax inspect {quoted} --out look"]
     lines += [f"fit    tissuejax fit {quoted} --energy reduced-polynomial-2 --volumetric quadratic"]
     written = {sample.name: {"file": str(out), "recordings": len(sample.recordings)}}
@@ -234,16 +236,23 @@ def _stem(path: Path) -> str:
     return name.rpartition(".")[0] or name
 
 
-def _refuse_no_file(path: Path) -> None:
-    """Refuse what isn't a readable file.
+def _quoted(path: Path) -> str:
+    """A path for a command line to copy; one with a line break in the way that shells write it."""
+    text = str(path)
+    return shlex.quote(text) if text.isprintable() else "$'" + printable(text).replace("'", "\\'") + "'"
+
+
+def _refuse_nothing(path: Path) -> None:
+    """Refuse what isn't a readable file with something in it.
 
     Raises:
-        InputError: no such file, a folder, an empty file.
+        InputError: no such file, a folder, one that can't be read, an empty file.
     """
-    if not path.exists():
-        near = sorted(p.name for p in path.parent.glob(f"[!.]*{path.suffix}"))[:8] if path.parent.is_dir() else []
-        raise InputError(f"{path}: no such file.{' There are: ' + ', '.join(near) + '.' if near else ''}")
-    if path.is_dir():
-        raise InputError(f"{path}: found a folder, expected a file")
-    if path.stat().st_size == 0:
+    refuse_no_file(path, "a table of columns")
+    try:
+        with open(path, "rb") as file:
+            content = file.read(1)
+    except OSError as error:
+        raise InputError(f"{shown(path)}: can't be read ({error.strerror}); check its rights and its disk") from error
+    if not content:
         raise InputError(f"{path}: found an empty file, expected a table of columns")

@@ -18,7 +18,9 @@ from tissuejax.families import members
 from tissuejax.recordings import checks
 from tissuejax.recordings.format import Format
 from tissuejax.recordings.hdf5_writing import write
+from tissuejax.recordings.places import refuse_no_file
 from tissuejax.recordings.recording import Sample
+from tissuejax.storage import shown
 
 __all__ = ["formats", "names", "read", "read_all", "write"]
 
@@ -92,7 +94,7 @@ def _readable(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        name = error.filename or path
+        name = shown(error.filename or path)
         raise InputError(
             f"{name}: can't be read ({error.strerror or error}); check its rights and its disk, or name another file"
         ) from error
@@ -109,12 +111,7 @@ def _split(path: str | os.PathLike) -> tuple[Path, str | None]:
 def _format(path: Path) -> Format:
     known: Mapping[str, Format] = formats()
     what = "; ".join(f"{name} ({', '.join(f.endings)})" for name, f in known.items())
-    if not path.exists():
-        near = sorted(p.name for p in path.parent.glob(f"[!.]*{path.suffix}"))[:8] if path.parent.is_dir() else []
-        there = f" In {path.parent} there are: {', '.join(near)}." if near else ""
-        raise InputError(f"{path}: no such file.{there}")
-    if path.is_dir():
-        raise InputError(f"{path}: found a folder, expected a file: {what}")
+    refuse_no_file(path, what)
     with open(path, "rb") as file:
         head = file.read(4096)
     if not head:

@@ -323,4 +323,4 @@ def _sample(header: Mapping[str, str], path: Path) -> str:
         name = re.sub(r"[^\w .+-]", "-", named.get(key, "")).strip(" .")
         if 0 < len(name) <= 60 and not readable(name):
             return name
-    return re.sub(r"[{}#/\\]", "-", path.name.removesuffix(".gz").rpartition(".")[0]) or "sample"
+    return re.sub(r"[{}#/\\\x00-\x1f\x7f]", "-", path.name.removesuffix(".gz").rpartition(".")[0]) or "sample"

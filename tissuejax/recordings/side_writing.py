@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from tissuejax.errors import InputError
 from tissuejax.recordings.exports.meanings import EXPERIMENT_WORDS
 from tissuejax.recordings.guessing import Guess
+from tissuejax.storage import printable
 
 _WIDTH = 46  # column in which comments begin
 COMMENTS = {
@@ -62,8 +63,8 @@ def side_text(guess: Guess, file: str) -> str:
         guess: what was found.
         file: the table as the side file calls it.
     """
-    lines = [f"# Says what {guess.path.name} holds. Change what is wrong; text after '#' is a comment."]
-    lines += [f"# Assumed: {sentence}." for sentence in guess.said]
+    lines = [f"# Says what {printable(guess.path.name)} holds. Change what is wrong; text after '#' is a comment."]
+    lines += [f"# Assumed: {printable(sentence)}." for sentence in guess.said]
     lines.append("")
     keys: dict[str, object] = {"file": file}
     keys |= {"format": guess.format} if guess.format else {}
@@ -107,7 +108,8 @@ def slab_text(guess: Guess, side: str, height: str) -> str:
         height: of the layer, with its unit.
     """
     return (
-        f"# The body under the tip of {guess.path.name}, a flat layer; `tissuejax import` makes a recording of it.\n"
+        f"# The body under the tip of {printable(guess.path.name)}, a flat layer; `tissuejax import` makes a recording "
+        "of it.\n"
         f"sample = {json.dumps(guess.sample, ensure_ascii=False)}\n"
         '# density = "1060 kg/m^3"\n\n'
         "[body]\n"
