@@ -228,3 +228,25 @@ def test_a_surface_with_a_hole_is_refused_in_words_of_its_programs(lab):
     (lab / "probe.toml").write_text(SLAB.replace('slab = "20mm"\nwidth = "60mm"\nedge = "6mm"', body))
     with pytest.raises(InputError, match="3 open edges.*MeshLab.*Blender.*Python"):
         probing_sample(lab / "probe.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            '"1060kg/m^3"',
+            '"1.06 kg/m^3"',
+            "note: density is 1.06 kg/m^3, where soft tissue has about 1000: g/cm^3 read",
+        ),
+        ("gravity = true", "gravity = [0, 0, 9.81]", "note: gravity [0, 0, 9.81] m/s^2 points upward"),
+        ("radius", "radius", ""),
+    ],
+)
+def test_a_slip_of_density_or_gravity_is_remarked(old, new, words, lab, capsys):
+    (lab / "probe.toml").write_text(SLAB.replace(old, new))
+    assert main(["import", str(lab / "probe.toml")]) == 0
+    out = capsys.readouterr().out
+    assert words in out
+    assert ("note: density" in out or "note: gravity" in out) == bool(words)
+    assert main(["inspect", str(lab / "probe.h5")]) == 0
+    assert words.removeprefix("note: ") in capsys.readouterr().out
