@@ -331,3 +331,18 @@ def test_what_is_assumed_and_what_is_not_used_is_printed(tmp_path, capsys):
     assert said
     assert all(f"assumed: {s}" in out for s in said)
     assert "not used: Room (degC)" in out
+
+
+def test_a_diameter_under_pressure_is_no_displacement(tmp_path):
+    (tmp_path / "my.csv").write_bytes(table(["Time (s),Diameter (mm),Pressure (mmHg)"], ROWS + [0, 5, 0]))
+    assert main(["import", str(tmp_path / "my.csv")]) == 2
+
+
+def test_a_load_that_rises_as_the_specimen_shortens_is_compression(tmp_path, capsys):
+    rows = np.stack([T, 25 - U, F], axis=1)
+    (tmp_path / "my.csv").write_bytes(table(["Time (s),Height (mm),Force (N)"], rows))
+    assert main(["import", str(tmp_path / "my.csv"), "--height", "25mm", "--area", "12mm^2"]) == 0
+    assert "'Force (N)' rises as the specimen shortens: compression counts positive" in capsys.readouterr().out
+    r = read(tmp_path / "my.toml").recordings["r1"]
+    assert r.inputs["stretch"][-1] == pytest.approx(0.8)
+    np.testing.assert_allclose(r.channels["nominal_stress"].values, -F / 12e-6, rtol=1e-5)

@@ -13,6 +13,7 @@ from tissuejax.recordings.exports.meanings import (
     bare,
     quantity_by_unit,
     quantity_of,
+    sizes_of,
     split_unit,
 )
 from tissuejax.recordings.side_file import KINEMATIC, QUANTITIES, STRESS
@@ -32,7 +33,9 @@ _ACROSS = re.compile(r"\b(normal|axial|normalkraft|axialkraft|fn|fz|thrust)\b")
 _LABEL = re.compile(r"[a-z]?\d{1,3}|[a-z]{1,2}")
 AXES = (("x", "y"), ("1", "2"), ("xx", "yy"), ("11", "22"))
 # Named by its unit alone, such a column is no measured load or deformation.
-_OTHER = re.compile(r"modul|g'|e'|rate|error|std|sd|noise|set ?point|target|command|soll|amplitude|max|min|peak")
+_OTHER = re.compile(
+    r"modul|g'|e'|rate|error|std|sd|noise|set ?point|target|command|soll|amplitude|max|min|peak|pressure"
+)
 
 
 @dataclass(frozen=True)
@@ -107,6 +110,7 @@ def _left_over(found: list[Guessed], meanings: Mapping[str, str], shear: bool) -
             for g in free
             if texts[g.column] not in meanings
             and not _OTHER.search(texts[g.column])
+            and not sizes_of(g.column)
             and not (shear and _ACROSS.search(texts[g.column]))
         ]
         if len(free) == 1:

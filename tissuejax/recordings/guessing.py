@@ -229,7 +229,7 @@ def _content(path: Path, format: str) -> tuple[TableExport | None, Exported, dic
         exported = kind.read(path)
         blocks = f"{len(exported.blocks)} tables" if len(exported.blocks) > 1 else "text after the table"
         if wide > 0:
-            blocks = f"{wide} more names than cells in a row (the names count from the left)"
+            blocks = f"a line of names longer by {wide} than the rows (names count from the left)"
         return kind, exported, {}, [f'{blocks} found: read as format = "text"']
     top = table.names_at if table.names_at is not None else table.first
     exported = stacked(path, [table], text.header(lines[:top], whole.separator) | sizes, decimal=whole.decimal)

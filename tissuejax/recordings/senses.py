@@ -30,6 +30,15 @@ def signs_of(
     if not both.any():
         return {}, positive or "tension", []
     x, y = x[both], y[both]
+    if (
+        not positive
+        and experiment in ("uniaxial", "planar", "equibiaxial")
+        and motion.quantity in ("stretch", "length")
+    ):
+        most = int(np.argmax(np.abs(y - y[0])))
+        if x[most] < x[0] and y[most] > y[0]:
+            said = f"{load.column!r} rises as the specimen shortens: compression counts positive"
+            return {}, "compression", [said]
     told = positive or experiment == "simple-shear" or motion.quantity in ("stretch", "length")
     if told and experiment != "probing":
         return {}, positive or "tension", []
