@@ -16,8 +16,6 @@ from tissuejax.tled.shapes import Sphere
 PRESSURES = (1.0, 5e5)  # Pa over the cross section of the ball: below nothing is felt, above soft tissue is torn
 LARGEST = 3.0  # m: no rig is as large
 LOADED = 0.5  # of the largest force, at the first sample: nothing was zeroed, or the start is missing
-DENSITIES = (200.0, 3000.0)  # kg/m^3: between foam and bone
-HEAVY = 1000.0  # a density in g/cm^3 is so much less
 
 
 def probing_slips(sample: Sample, names: Iterable[str] | None = None) -> list[str]:
@@ -48,23 +46,10 @@ def all_slips(sample: Sample, names: Iterable[str] | None = None) -> list[str]:
 
 
 def _body(sample: Sample) -> list[str]:
-    said, density = [], sample.density
-    if density is not None and not DENSITIES[0] < density < DENSITIES[1]:
-        like = "; g/cm^3 read as kg/m^3?" if DENSITIES[0] < HEAVY * density < DENSITIES[1] else ""
-        said.append(f"the density is {density:.4g} kg/m^3, tissue has about 1000{like}")
-    gravity = None if sample.gravity is None else np.asarray(sample.gravity, float)
-    if gravity is not None and gravity.any():
-        points = sample.geometry.points
-        held = points[np.asarray(sample.geometry.fixed, int)] if len(sample.geometry.fixed) else points
-        up = points.mean(0) - held.mean(0)
-        if up @ gravity > 0.5 * np.linalg.norm(up) * np.linalg.norm(gravity):
-            said.append(
-                "gravity points from the support to the free surface: a body that hangs, or a sign turned round"
-            )
     size = float(np.ptp(sample.geometry.points, axis=0).max())
     if size > LARGEST:
-        said.append(f"the body is {size:.4g} m large: mm read as m?")
-    return said
+        return [f"the body is {size:.4g} m large: mm read as m?"]
+    return []
 
 
 def _probing(recording: Recording, points: Float[np.ndarray, "N 3"], top: Facets) -> list[str]:
