@@ -11,12 +11,15 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
+import tissuejax as tj
 from tests.specimens import recording
 from tissuejax.campaign.child import Child
 from tissuejax.campaign.run import begin, go_on, status, table
 from tissuejax.campaign.store import Store
 from tissuejax.campaign.task import Settings, TooLong, limited
 from tissuejax.cli import main
+from tissuejax.errors import InputError
+from tissuejax.fitting.advice import suspect
 from tissuejax.recordings.hdf5_writing import write
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
@@ -71,6 +74,59 @@ def test_failures_are_rows_and_only_what_is_missing_is_done(tmp_path):
     assert status(tmp_path / "c")["missing"] == 6
     assert main(["campaign", "report", str(tmp_path / "c"), "--json"]) == 0
     assert (tmp_path / "c" / "cases.csv").read_text().count("\n") == 7
+
+
+def pull(name, stress):
+    """A specimen's pull, its noise said to be 5 Pa."""
+    made = recording("pull", "uniaxial", np.arange(20.0), STRETCH)
+    channel = Channel(np.arange(20.0), stress, "Pa", 5.0)
+    return Sample(name, {"pull": Recording("pull", "uniaxial", made.inputs, {"nominal_stress": channel}, {})})
+
+
+def test_what_a_fit_would_call_suspect_is_counted_and_said(tmp_path, capsys):
+    files = cohort(tmp_path, 2, bad=False)
+    stiffening = pull("stiff", 1e5 * (STRETCH - 1) ** 3)
+    write(stiffening, tmp_path / "stiff.h5")
+    c = str(tmp_path / "c")
+    asked = ["--energy", "neo-hookean", "--multistart", "1"]
+    assert main(["campaign", "run", c, *files, str(tmp_path / "stiff.h5"), *asked]) == 0
+    assert "3 cases: 3 done, 1 of them not to be used as they are (misfit 1), 0 failed" in capsys.readouterr().out
+    assert main(["campaign", "report", c, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["suspect"], told["suspect_kinds"], told["usable"]) == (1, {"misfit": 1}, 2)
+    rows = {r["sample"]: r for r in table(tmp_path / "c")}
+    alone = tj.fit(stiffening, "neo-hookean", search=tj.Search(multistart=1))
+    assert rows["stiff"]["suspect"] == "; ".join(suspect(alone)) != ""
+    assert rows["s0"]["suspect"] == rows["s1"]["suspect"] == ""
+    assert (tmp_path / "c" / "cases.csv").read_text().startswith("sample,status,fit,suspect,")
+    page = (tmp_path / "c" / "report.html").read_text()
+    assert "not to be used as they are (misfit 1)" in page
+    assert "<th>std energy.mu (Pa)</th>" in page
+    assert main(["campaign", "run", str(tmp_path / "d"), str(tmp_path / "stiff.h5"), *asked]) == 4
+    assert main(["campaign", "report", str(tmp_path / "d")]) == 4
+    assert main(["campaign", "status", str(tmp_path / "d")]) == 0
+
+
+def test_a_fit_of_an_earlier_version_is_not_taken_for_a_good_one(tmp_path):
+    store = begin(tmp_path / "c", cohort(tmp_path, 1, bad=False), SETTINGS)
+    go_on(tmp_path / "c")
+    path = store.path(store.planned()[0][0].key)
+    row = json.loads(path.read_text())
+    del row["answer"]["suspect"]
+    path.write_text(json.dumps(row))
+    assert status(tmp_path / "c")["suspect_kinds"] == {"not judged": 1}
+
+
+def test_a_dead_sensor_is_a_failure_and_not_a_stiffness_of_zero(tmp_path):
+    dead = tmp_path / "dead.h5"
+    write(pull("dead", np.zeros(20)), dead)
+    begin(tmp_path / "c", [*cohort(tmp_path, 1, bad=False), str(dead)], SETTINGS)
+    told = go_on(tmp_path / "c")
+    assert (told["done"], told["failed"]) == (1, 1)
+    with pytest.raises(InputError) as refused:
+        tj.fit(dead, "neo-hookean")
+    assert told["failures"]["dead"] == str(refused.value)
+    assert "zero throughout" in told["failures"]["dead"]
 
 
 def test_a_changed_recording_is_another_case(tmp_path):

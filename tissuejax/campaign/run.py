@@ -8,9 +8,11 @@ from typing import Any
 from tissuejax import campaign as package
 from tissuejax.campaign.engine import Engine
 from tissuejax.campaign.store import Store
-from tissuejax.campaign.task import Settings, tasks
+from tissuejax.campaign.task import Settings, Task, tasks
 from tissuejax.families import lookup, members
 from tissuejax.progress import Progress, Silent
+
+UNJUDGED = {"not judged": ["an earlier version fitted it and did not judge it; give the command of `run` again"]}
 
 
 def engines() -> dict[str, type[Engine]]:
@@ -52,10 +54,14 @@ def go_on(
 
 
 def status(folder: Path) -> dict[str, Any]:
-    """How many cases are done, failed, missing; failures with their reasons."""
+    """How many cases are done, failed, missing; failures with their reasons.
+
+    Of those done, "suspect" should not be used as they are ("suspect_kinds": for what) and "usable" may be.
+    """
     store = Store(folder)
     planned, _ = store.planned()
-    counts: dict[str, Any] = {"cases": len(planned), "done": 0, "failed": 0, "missing": 0, "failures": {}}
+    counts: dict[str, Any] = {"cases": len(planned), "done": 0, "failed": 0, "missing": 0, "suspect": 0}
+    counts |= {"suspect_kinds": {}, "failures": {}}
     for task, row in store.rows(planned):
         if row is None:
             counts["missing"] += 1
@@ -63,7 +69,26 @@ def status(folder: Path) -> dict[str, Any]:
             counts[row["status"]] += 1
             if row["status"] == "failed":
                 counts["failures"][task.sample] = row["reason"]
-    return counts
+            elif kinds := doubts(task, row):
+                counts["suspect"] += 1
+                for kind in kinds:
+                    counts["suspect_kinds"][kind] = counts["suspect_kinds"].get(kind, 0) + 1
+    return counts | {"usable": counts["done"] - counts["suspect"]}
+
+
+def doubts(task: Task, row: dict[str, Any]) -> dict[str, list[str]]:
+    """Why a finished fit should not be used as it is, by kind; empty where it may be, and for a diagnosis."""
+    if row["status"] != "done" or task.settings.kind != "fit":
+        return {}
+    return row["answer"].get("suspect", UNJUDGED)
+
+
+def headline(counts: dict[str, Any]) -> str:
+    """The counts of `status` in a line."""
+    kinds = ", ".join(f"{kind} {n}" for kind, n in sorted(counts["suspect_kinds"].items(), key=lambda of: -of[1]))
+    unfit = f", {counts['suspect']} of them not to be used as they are ({kinds})" if counts["suspect"] else ""
+    cases = f"{counts['cases']} case{'s' * (counts['cases'] != 1)}"
+    return f"{cases}: {counts['done']} done{unfit}, {counts['failed']} failed, {counts['missing']} missing"
 
 
 def units(folder: Path) -> dict[str, str]:
@@ -76,7 +101,8 @@ def units(folder: Path) -> dict[str, str]:
 
 
 def table(folder: Path) -> list[dict[str, Any]]:
-    """One row a case: sample, status, chi-square, parameters with their errors; for a diagnosis the verdict."""
+    """One row a case: sample, status, what makes it suspect, chi-square, parameters with their errors; for a diagnosis
+    the verdict."""
     store, found = Store(folder), []
     for task, row in store.rows(store.planned()[0]):
         line: dict[str, Any] = {"sample": task.sample, "status": "missing" if row is None else row["status"]}
@@ -84,7 +110,8 @@ def table(folder: Path) -> list[dict[str, Any]]:
             line["reason"] = row["reason"]
         elif row is not None and task.settings.kind == "fit":
             a = row["answer"]
-            line |= {"fit": a["status"], "chi2_per_dof": a["chi2_per_dof"]}
+            unfit = "; ".join(why for of_kind in doubts(task, row).values() for why in of_kind)
+            line |= {"fit": a["status"], "suspect": unfit, "chi2_per_dof": a["chi2_per_dof"]}
             for path, p in a["parameters"].items():
                 if p["free"]:
                     line |= {path: p["value"], f"std {path}": p["std"]}

@@ -10,8 +10,9 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 from tissuejax.cache.key import key
-from tissuejax.errors import InputError
+from tissuejax.errors import InputError, TissueError
 from tissuejax.recordings.files import read, read_all
+from tissuejax.recordings.plausible import refuse_unusable, slips
 
 KINDS = ("fit", "diagnose")
 BY_PATH = {"fix", "start", "bounds", "priors"}
@@ -108,8 +109,13 @@ def answer(task: Task) -> dict[str, Any]:
     except (KeyboardInterrupt, SystemExit):
         raise
     except Exception as error:  # whatever a case does wrong is a row, and the others go on
-        row |= {"status": "failed", "reason": f"{type(error).__name__}: {error}"}
+        row |= {"status": "failed", "reason": why(error)}
     return row | {"seconds": time.perf_counter() - begun, "worker": os.getpid()}
+
+
+def why(error: Exception) -> str:
+    """An error as a reason: a sentence of ours as it is, anything else with its kind before it."""
+    return str(error) if isinstance(error, TissueError) else f"{type(error).__name__}: {error}"
 
 
 def _solved(task: Task) -> dict[str, Any]:
@@ -127,6 +133,7 @@ def _solved(task: Task) -> dict[str, Any]:
     from tissuejax.effects.catalogue import effect
     from tissuejax.energies import catalogue
     from tissuejax.experiments.predictor import predictor
+    from tissuejax.fitting.advice import suspicions
     from tissuejax.fitting.least_squares import fit
     from tissuejax.fitting.options import Objective, Search, Unknowns
     from tissuejax.fitting.setup import problem, split
@@ -138,6 +145,7 @@ def _solved(task: Task) -> dict[str, Any]:
     for k in BY_PATH & asked.keys():
         asked[k] = {path: float(of[0]) if len(of) == 1 else tuple(map(float, of)) for path, *of in asked[k]}
     fitted, held = split(sample, tuple(n for n in asked.pop("only", ()) if n in sample.recordings), held)
+    refuse_unusable(sample, fitted)
     unknowns, objective, search = (
         kind(**{f.name: asked[f.name] for f in fields(kind) if f.name in asked})
         for kind in (Unknowns, Objective, Search)
@@ -146,7 +154,10 @@ def _solved(task: Task) -> dict[str, Any]:
     start = {path: posed.start[path] for path in unknowns.start or ()} or None
     search = replace(search, multistart=s.multistart, seed=s.seed)
     found = fit(posed, start=start, search=search, holdout=held)
-    return {name: value for name, value in found.record().items() if name not in UNSTORED}
+    found.warnings.extend(f"Look at the data: {sentence}." for sentence in slips(sample, (*fitted, *held)))
+    doubts = {} if found.converged else {"not converged": [f"the search did not converge: {found.status}"]}
+    record = {name: value for name, value in found.record().items() if name not in UNSTORED}
+    return record | {"suspect": doubts | suspicions(found)}
 
 
 @contextmanager

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import ClassVar
 
 from tissuejax import verbs
-from tissuejax.campaign.run import begin, engines, go_on, status, table, units
+from tissuejax.campaign.run import begin, engines, go_on, headline, status, table, units
 from tissuejax.campaign.store import PLAN, Store
 from tissuejax.campaign.task import Settings
 from tissuejax.commands.arguments import add_fit, add_model, fit_options, positive
-from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.command import SUSPECT, Command, Reply
 from tissuejax.commands.outputs import WITH_A_PAGE
 from tissuejax.errors import InputError
 from tissuejax.fitting.options import Objective, Search
@@ -48,6 +48,9 @@ them (the part of a sample's name that --group matches: an animal, a day), and w
 the extra `bayes`.
 
 Engines: serial, processes, dask (extra `cluster`). docs/cohort.md shows Slurm.
+
+Exit code 0: some case gave numbers that can be used; 2: the input can't be used; 4: cases ended and none did (failed, or
+suspect by the test of `fit`: at a bound, unstable, a misfit of several times the noise; --json has "usable").
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
@@ -91,6 +94,7 @@ Engines: serial, processes, dask (extra `cluster`). docs/cohort.md shows Slurm.
                 counts,
                 _text(counts)
                 + f"\n{counts['ran']} done now in {counts['seconds']:.1f} s, {counts['per_second']:.2g} a second",
+                _code(counts),
             )
         if given.action == "status":
             counts = status(given.folder)
@@ -138,10 +142,14 @@ def _refuse_another(folder: Path, settings: Settings) -> None:
 
 
 def _text(counts: dict) -> str:
-    cases = f"{counts['cases']} case{'s' * (counts['cases'] != 1)}"
-    lines = [f"{cases}: {counts['done']} done, {counts['failed']} failed, {counts['missing']} missing"]
+    lines = [headline(counts)]
     lines += [f"  ! {sample}: {reason}" for sample, reason in list(counts["failures"].items())[:20]]
     return "\n".join(lines)
+
+
+def _code(counts: dict) -> int:
+    """4 where cases ended and not one gave numbers that can be used; single suspect ones are a matter of the table."""
+    return SUSPECT if counts["done"] + counts["failed"] and not counts["usable"] else 0
 
 
 def _report(folder: Path) -> Reply:
@@ -157,7 +165,7 @@ def _report(folder: Path) -> Reply:
     writer.writerows(rows)
     files = {"table": write_text(folder / "cases.csv", text.getvalue())} | write_cohort(rows, status(folder), folder)
     counts = status(folder) | {"files": {n: str(p) for n, p in files.items()}}
-    return Reply(counts, "\n".join([_text(counts), *(str(p) for p in files.values())]))
+    return Reply(counts, "\n".join([_text(counts), *(str(p) for p in files.values())]), _code(counts))
 
 
 def _population(folder: Path, pattern: str | None) -> Reply:

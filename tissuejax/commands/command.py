@@ -5,6 +5,8 @@ import argparse
 from dataclasses import dataclass
 from typing import ClassVar
 
+SUSPECT = 4  # exit code of numbers that should not be used as they are
+
 
 @dataclass(frozen=True)
 class Reply:

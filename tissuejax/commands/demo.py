@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import tissuejax.commands as package
 from tissuejax import verbs
-from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.command import SUSPECT, Command, Reply
 from tissuejax.commands.diagnose import diagnosed
-from tissuejax.commands.fitting import SUSPECT, reply
+from tissuejax.commands.fitting import reply
 from tissuejax.commands.outputs import folder_named
 from tissuejax.errors import InputError
 from tissuejax.progress import for_terminal

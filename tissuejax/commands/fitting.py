@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from tissuejax import verbs
 from tissuejax.commands.arguments import add_fit, add_model, fit_options
-from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.command import SUSPECT, Command, Reply
 from tissuejax.commands.outputs import KEPT, add_out, folder, made, refuse_other
 from tissuejax.errors import InputError
 from tissuejax.fitting.advice import suspect
@@ -20,8 +20,6 @@ from tissuejax.recordings.files import read, read_all
 from tissuejax.report import sentences
 from tissuejax.report.page import write_fit
 from tissuejax.storage import write_text
-
-SUSPECT = 4  # exit code of a fit whose numbers should not be used as they are
 
 
 class FitCommand(Command):

@@ -112,15 +112,20 @@ def beyond_noise(found: "Fit") -> dict[str, float]:
     return times
 
 
-def suspect(found: "Fit") -> list[str]:
-    """Why the numbers should not be used as they are: a bound, an unstable law, a misfit of several times the noise."""
-    said = [f"{path} ended at its {side} bound" for path, side in found.at_bound.items()]
+def suspicions(found: "Fit") -> dict[str, list[str]]:
+    """Why the numbers should not be used as they are, by kind: at a bound, unstable, a misfit far above the noise."""
+    said = {"at a bound": [f"{path} ended at its {side} bound" for path, side in found.at_bound.items()]}
     if sentence(found.stability):
-        said.append("the fitted energy is unstable inside the recorded range")
+        said["unstable"] = ["the fitted energy is unstable inside the recorded range"]
     worst = max(beyond_noise(found).values(), default=0.0)
     if worst > GROSS:
-        said.append(f"the misfit is {worst:.3g} times the noise")
-    return said
+        said["misfit"] = [f"the misfit is {worst:.3g} times the noise"]
+    return {kind: why for kind, why in said.items() if why}
+
+
+def suspect(found: "Fit") -> list[str]:
+    """The sentences of `suspicions`, the one test of numbers that should not be used as they are."""
+    return [why for of_kind in suspicions(found).values() for why in of_kind]
 
 
 def _misfit(found: "Fit") -> list[str]:

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from tissuejax.campaign.run import headline
 from tissuejax.report.cohort import Cohort
 from tissuejax.report.page import figures, render
 from tissuejax.storage import write_bytes, write_text
@@ -13,11 +14,11 @@ ROWS = 200  # rows on the page; all are in the table
 def write_cohort(rows: list[dict[str, Any]], counts: dict[str, Any], out: Path) -> dict[str, Path]:
     """report.html and the figures; their paths by name."""
     drawn = figures(Cohort(tuple(rows)))
-    columns = [n for n in dict.fromkeys(n for row in rows for n in row) if not n.startswith("std ")]
+    columns = list(dict.fromkeys(n for row in rows for n in row))
     name = out.parent.name if out.name == "campaign" else out.name  # of a problem file: out/liver/campaign
     page = render(
-        "cohort.html.j2", title=f"Campaign {name}", counts=counts, rows=rows[:ROWS], columns=columns, most=ROWS,
-        figures=drawn,
+        "cohort.html.j2", title=f"Campaign {name}", lead=headline(counts), counts=counts, rows=rows[:ROWS],
+        columns=columns, most=ROWS, figures=drawn,
     )  # fmt: skip
     written = {f["name"]: write_bytes(out / f"{f['name']}.png", f["png"]) for f in drawn}
     return written | {"page": write_text(out / "report.html", page)}
