@@ -1,5 +1,6 @@
 """Campaigns: the same answers whatever the engine, nothing done twice, nothing lost when something is killed."""
 
+import io
 import json
 import os
 import signal
@@ -20,6 +21,7 @@ from tissuejax.campaign.task import Settings, TooLong, limited
 from tissuejax.cli import main
 from tissuejax.errors import InputError
 from tissuejax.fitting.advice import suspect
+from tissuejax.progress import Lines
 from tissuejax.recordings.hdf5_writing import write
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
@@ -127,6 +129,67 @@ def test_a_dead_sensor_is_a_failure_and_not_a_stiffness_of_zero(tmp_path):
         tj.fit(dead, "neo-hookean")
     assert told["failures"]["dead"] == str(refused.value)
     assert "zero throughout" in told["failures"]["dead"]
+
+
+def test_a_file_that_cannot_be_read_is_a_failure_and_the_others_are_done(tmp_path, capsys):
+    good = cohort(tmp_path, 2, bad=False)
+    (tmp_path / "bad.toml").write_text("this is [ no TOML")
+    (tmp_path / "gone.toml").write_text(
+        'file = "gone.csv"\nsample = "late"\nrecording = "pull"\nexperiment = "uniaxial"\n[columns]\n'
+        'stretch = { column = "stretch" }\nnominal_stress = { column = "stress", unit = "kPa" }\n'
+    )
+    c, gone = str(tmp_path / "c"), str(tmp_path / "gone.toml")
+    files = [gone, str(tmp_path / "bad.toml"), str(tmp_path / "none.h5"), *good]
+    asked = ["--energy", "neo-hookean", "--multistart", "1"]
+    assert main(["campaign", "run", c, *files, *asked]) == 0
+    assert "3 of 5 files can't be read" in capsys.readouterr().err
+    told = status(tmp_path / "c")
+    assert (told["cases"], told["done"], told["failed"]) == (5, 2, 3)
+    assert set(told["failures"]) == {"gone.toml", "bad.toml", "none.h5"}
+    with pytest.raises(InputError) as refused:
+        tj.read(gone)
+    assert told["failures"]["gone.toml"] == str(refused.value)
+    rows = [f"{l},{2 * (l - l**-2)}\n" for l in (1, 1.1, 1.2, 1.3, 1.4)]
+    (tmp_path / "gone.csv").write_text("stretch,stress\n" + "".join(rows))
+    assert main(["campaign", "resume", c, "--failed"]) == 0
+    told = status(tmp_path / "c")
+    assert (told["cases"], told["done"], told["failed"]) == (5, 3, 2)
+    found = {r["sample"]: r for r in table(tmp_path / "c")}
+    assert found["late"]["energy.mu"] == pytest.approx(2000, rel=1e-5)
+
+
+def test_one_bad_sample_of_a_file_leaves_its_others_alone(tmp_path):
+    rows = [f"{s},{l},{mu * (l - l**-2)}\n" for s, mu in (("a", 3), ("b", 5)) for l in (1, 1.1, 1.2, 1.3, 1.4)]
+    (tmp_path / "lab.csv").write_text("specimen,stretch,stress\n" + "".join(rows) + "c,-1,0\nc,-2,0\n")
+    (tmp_path / "lab.toml").write_text(
+        'file = "lab.csv"\nsample = "{specimen}"\nrecording = "pull"\nexperiment = "uniaxial"\n[columns]\n'
+        'stretch = { column = "stretch" }\nnominal_stress = { column = "stress", unit = "kPa" }\n'
+    )
+    begin(tmp_path / "c", [str(tmp_path / "lab.toml")], SETTINGS)
+    told = go_on(tmp_path / "c")
+    assert (told["done"], list(told["failures"])) == (2, ["c"])
+    assert go_on(tmp_path / "c", failed=True)["cases"] == 3
+
+
+def test_a_selection_that_picks_nothing_is_refused(tmp_path, capsys):
+    (good,), c = cohort(tmp_path, 1, bad=False), str(tmp_path / "c")
+    for wrong in (f"{tmp_path}/day*.toml", f"{good}#s7"):
+        assert main(["campaign", "run", c, good, wrong, "--energy", "neo-hookean"]) == 2
+    assert "unknown sample 's7'" in capsys.readouterr().err
+    lost = [str(tmp_path / name) for name in ("x.h5", "y.h5")]
+    assert main(["campaign", "run", c, *lost, "--energy", "neo-hookean"]) == 2
+    assert "none of the 2 files can be read; the first: " in capsys.readouterr().err
+    assert not (tmp_path / "c").exists()
+
+
+def test_progress_has_one_count(tmp_path):
+    begin(tmp_path / "c", cohort(tmp_path, 3, bad=False), SETTINGS)
+    store = Store(tmp_path / "c")
+    store.work(store.planned()[0][0])
+    said = io.StringIO()
+    go_on(tmp_path / "c", progress=Lines(every=0.0, file=said))
+    lines = [line.split("] ")[1] for line in said.getvalue().splitlines()]
+    assert lines == ["cases (1 done before) 1 of 2: s1", "cases (1 done before) 2 of 2: s2"]
 
 
 def test_a_changed_recording_is_another_case(tmp_path):

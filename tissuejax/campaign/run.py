@@ -8,7 +8,7 @@ from typing import Any
 from tissuejax import campaign as package
 from tissuejax.campaign.engine import Engine
 from tissuejax.campaign.store import Store
-from tissuejax.campaign.task import Settings, Task, tasks
+from tissuejax.campaign.task import Settings, Task, again, tasks
 from tissuejax.families import lookup, members
 from tissuejax.progress import Progress, Silent
 
@@ -35,19 +35,23 @@ def go_on(
 
     Args:
         engine: "serial", "processes" or "dask".
-        failed: do failed cases again too.
+        failed: do failed cases again too; files that could not be read are looked at again.
 
     Returns:
         The counts of `status`, and "ran", "seconds", "per_second" of this run.
     """
     store = Store(folder)
     planned, retries = store.planned()
+    if failed and any(task.unread for task in planned):
+        planned = [new for task in planned for new in (again(task) if task.unread else [task])]
+        store.plan(planned, retries)
     todo = store.missing(planned, retries, failed)
     for task in todo:
         if failed:
             store.path(task.key).unlink(missing_ok=True)
     begun, kind = time.perf_counter(), lookup("engine", engine, engines())()
-    with (progress or Silent()).stage(f"{len(todo)} of {len(planned)} cases", len(todo)) as stage:
+    before = len(planned) - len(todo)
+    with (progress or Silent()).stage(f"cases ({before} done before)" if before else "cases", len(todo)) as stage:
         kind.run(store, todo, workers, lambda row: stage.advance(note=str(row["sample"])), where)
     seconds = time.perf_counter() - begun
     return status(folder) | {"ran": len(todo), "seconds": seconds, "per_second": len(todo) / max(seconds, 1e-9)}
@@ -68,7 +72,8 @@ def status(folder: Path) -> dict[str, Any]:
         else:
             counts[row["status"]] += 1
             if row["status"] == "failed":
-                counts["failures"][task.sample] = row["reason"]
+                name = task.sample if task.sample not in counts["failures"] else f"{task.sample} of {task.file}"
+                counts["failures"][name] = row["reason"]
             elif kinds := doubts(task, row):
                 counts["suspect"] += 1
                 for kind in kinds:

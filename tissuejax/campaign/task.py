@@ -4,15 +4,16 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Mapping
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 from tissuejax.cache.key import key
-from tissuejax.errors import InputError, TissueError
-from tissuejax.recordings.files import read, read_all
+from tissuejax.errors import InputError, TissueError, unknown
+from tissuejax.recordings.files import names, read
 from tissuejax.recordings.plausible import refuse_unusable, slips
+from tissuejax.recordings.recording import Sample
 
 KINDS = ("fit", "diagnose")
 BY_PATH = {"fix", "start", "bounds", "priors"}
@@ -50,13 +51,19 @@ class Settings:
 
 @dataclass(frozen=True)
 class Task:
-    """One case: the key of its answer, where its sample lies, the settings, and the limit in seconds."""
+    """One case: the key of its answer, where its sample lies, the settings, and the limit in seconds.
+
+    Attributes:
+        unread: why the sample could not be read when this was planned; then that is its answer. A file that gives no
+            names stands here by its own name.
+    """
 
     key: str
     file: str
     sample: str
     settings: Settings
     limit: float
+    unread: str = ""
 
     def plain(self) -> dict[str, Any]:
         """As plain data."""
@@ -66,7 +73,7 @@ class Task:
     def of(cls, data: Mapping[str, Any]) -> "Task":
         """From plain data."""
         said = {name: _frozen(value) for name, value in data["settings"].items()}
-        return cls(data["key"], data["file"], data["sample"], Settings(**said), data["limit"])
+        return cls(data["key"], data["file"], data["sample"], Settings(**said), data["limit"], data.get("unread", ""))
 
 
 def _frozen(value: Any) -> Any:
@@ -77,17 +84,73 @@ def _frozen(value: Any) -> Any:
 def tasks(files: list[str], settings: Settings, limit: float) -> list[Task]:
     """A task for every sample of every file; its key is the hash of recordings, settings, code and libraries.
 
+    What can't be read is a task as well, with the reason in it: one bad file leaves the others alone.
+
     Raises:
-        InputError: a file that can't be read, or code that changed on disk since it was loaded.
+        InputError: a selection that picks nothing, or code that changed on disk since it was loaded.
     """
     found = []
     for file in files:
-        for name, sample in read_all(file).items():
-            mark = key(sample, asdict(settings))
+        for name, sample in _samples(file):
+            unread = sample if isinstance(sample, str) else ""
+            mark = key(os.path.abspath(file) if unread else sample, *[name] * bool(unread), asdict(settings))
             if mark is None:
                 raise InputError("the package's code changed on disk while it was loaded; start again")
-            found.append(Task(mark, os.fspath(file), name, settings, limit))
+            found.append(Task(mark, os.fspath(file), name, settings, limit, unread))
     return found
+
+
+def again(task: Task) -> list[Task]:
+    """What takes the place of a task that could not be read: it may have been mended, and then gives its samples."""
+    found = tasks([task.file], task.settings, task.limit)
+    return [other for other in found if other.sample == task.sample] or found
+
+
+def first_of(files: list[str]) -> Sample:
+    """The first sample that can be read.
+
+    Raises:
+        InputError: there is none, or a selection picks nothing.
+    """
+    reasons = []
+    for file in files:
+        for _, sample in _samples(file):
+            if isinstance(sample, Sample):
+                return sample
+            reasons.append(sample)
+    several = f"none of the {len(files)} files can be read; the first: " if len(files) > 1 else ""
+    raise InputError(several + reasons[0])
+
+
+def _samples(file: str) -> Iterator[tuple[str, Sample | str]]:
+    """Every sample of a file by name, or why it can't be read; a file without readable names stands by its own."""
+    _refuse_nothing(file)
+    try:
+        known = names(file)
+    except Exception as error:  # whatever is wrong with one file is its row, and the others go on
+        yield os.path.basename(file), why(error)
+        return
+    for name in known:
+        try:
+            sample = read(file, name)
+        except Exception as error:
+            sample = why(error)
+        yield name, sample
+
+
+def _refuse_nothing(file: str) -> None:
+    """A selection that picks nothing is a slip in what was typed, and no failure of a case."""
+    whole, _, name = file.rpartition("#")
+    if os.path.exists(file):
+        return
+    if os.path.exists(whole):
+        known = [name]
+        with suppress(Exception):  # a file that gives no names says so in its row
+            known = names(whole)
+        if name not in known:
+            raise InputError(f"{whole}: {unknown('sample', name, known)}")
+    elif set("*?[") & set(file):
+        raise InputError(f"{file}: no file matches this pattern; give the names of files that are there")
 
 
 class TooLong(Exception):
@@ -103,6 +166,8 @@ def answer(task: Task) -> dict[str, Any]:
     row: dict[str, Any] = {"sample": task.sample, "file": task.file, "settings": asdict(task.settings)}
     try:
         with limited(task.limit):
+            if task.unread:
+                raise InputError(task.unread)
             row |= {"status": "done", "answer": _solved(task)}
     except TooLong:
         row |= {"status": "failed", "reason": f"took longer than {task.limit:g} s"}

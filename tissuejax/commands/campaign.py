@@ -5,6 +5,7 @@ import csv
 import io
 import math
 import re
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import ClassVar
@@ -12,14 +13,13 @@ from typing import ClassVar
 from tissuejax import verbs
 from tissuejax.campaign.run import begin, engines, go_on, headline, status, table, units
 from tissuejax.campaign.store import PLAN, Store
-from tissuejax.campaign.task import Settings
+from tissuejax.campaign.task import Settings, first_of
 from tissuejax.commands.arguments import add_fit, add_model, fit_options, positive
 from tissuejax.commands.command import SUSPECT, Command, Reply
 from tissuejax.commands.outputs import WITH_A_PAGE
 from tissuejax.errors import InputError
 from tissuejax.fitting.options import Objective, Search
 from tissuejax.progress import for_terminal
-from tissuejax.recordings.files import read_all
 from tissuejax.storage import write_text
 
 ACTIONS = ("run", "resume", "status", "report", "population")
@@ -49,8 +49,12 @@ the extra `bayes`.
 
 Engines: serial, processes, dask (extra `cluster`). docs/cohort.md shows Slurm.
 
-Exit code 0: some case gave numbers that can be used; 2: the input can't be used; 4: cases ended and none did (failed, or
-suspect by the test of `fit`: at a bound, unstable, a misfit of several times the noise; --json has "usable").
+A file that can't be read is a failed row too (said at the start, on standard error); mended, it is read again by `run`
+or by `resume --failed`.
+
+Exit code 0: some case gave numbers that can be used; 2: the input can't be used, no file can be read, or a pattern or a
+FILE#NAME picks nothing; 4: cases ended and none gave usable numbers (failed, or suspect by the test of `fit`: at a
+bound, unstable, a misfit of several times the noise; --json has "usable").
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
@@ -86,7 +90,7 @@ suspect by the test of `fit`: at a bound, unstable, a misfit of several times th
             settings = _settings(given)
             if not given.force:
                 _refuse_another(given.folder, settings)
-            begin(given.folder, given.files, settings, given.limit, given.retries)
+            _say_unread(begin(given.folder, given.files, settings, given.limit, given.retries), len(given.files))
         if given.action in ("run", "resume"):
             workers = positive(given.workers, "--workers")
             counts = go_on(given.folder, given.engine, workers, given.scheduler, given.failed, for_terminal())
@@ -103,8 +107,8 @@ suspect by the test of `fit`: at a bound, unstable, a misfit of several times th
 
 
 def _settings(given: argparse.Namespace) -> Settings:
-    """What is asked of every sample; paths are checked on the first."""
-    first = next(iter(read_all(given.files[0]).values()))
+    """What is asked of every sample; paths are checked on the first that can be read."""
+    first = first_of(given.files)
     model = verbs.material(
         given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
     ).across(tuple(first.recordings))
@@ -125,6 +129,18 @@ def _settings(given: argparse.Namespace) -> Settings:
         given.kind, given.energy, given.ogden_form, given.volumetric, tuple(given.effect), tuple(options["holdout"]),
         search.multistart, search.seed, tuple(pairs) if given.kind == "fit" else (),
     )  # fmt: skip
+
+
+def _say_unread(store: Store, files: int) -> None:
+    lost = [task for task in store.planned()[0] if task.unread]
+    if lost:
+        print(
+            f"tissuejax campaign: {len({task.file for task in lost})} of {files} files can't be read, in whole or in "
+            f"part; that is {len(lost)} failed rows, and the others are worked through: "
+            + ", ".join(task.sample for task in lost[:5])
+            + (", ..." if len(lost) > 5 else ""),
+            file=sys.stderr,
+        )
 
 
 def _refuse_another(folder: Path, settings: Settings) -> None:
