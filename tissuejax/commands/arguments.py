@@ -11,7 +11,7 @@ from tissuejax.parameters import Parameter
 from tissuejax.units import quantity
 
 
-def add_model(parser: argparse.ArgumentParser, required: bool = True) -> None:
+def add_model(parser: argparse._ActionsContainer, required: bool = True) -> None:
     """--energy and what goes with it."""
     parser.add_argument(
         "--energy",
@@ -31,8 +31,8 @@ def add_model(parser: argparse.ArgumentParser, required: bool = True) -> None:
     )
 
 
-def add_fit(parser: argparse.ArgumentParser) -> None:
-    """What can be said about a fit."""
+def add_fit(parser: argparse._ActionsContainer, multistart: int = 4) -> None:
+    """What can be said about a fit; `multistart` is the default."""
     parser.add_argument(
         "--only", action="append", default=[], metavar="RECORDING", help="fit this recording (repeat for more)"
     )
@@ -68,7 +68,9 @@ def add_fit(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="levenberg-marquardt (default), adam, lbfgs; for one probing also stress-curve",
     )
-    parser.add_argument("--multistart", type=int, default=4, metavar="N", help="number of starts (default 4)")
+    parser.add_argument(
+        "--multistart", type=int, default=multistart, metavar="N", help=f"number of starts (default {multistart})"
+    )
     parser.add_argument(
         "--max-steps", type=int, default=200, metavar="N", help="evaluations for each start (default 200)"
     )

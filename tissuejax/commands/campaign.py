@@ -58,25 +58,25 @@ bound, unstable, a misfit of several times the noise; --json has "usable").
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
-        """ACTION FOLDER [FILE ...] and settings."""
+        """ACTION FOLDER [FILE ...] and settings, grouped by the actions they are for."""
         parser.add_argument("action", choices=ACTIONS, help=", ".join(ACTIONS))
         parser.add_argument("folder", type=Path, metavar="FOLDER", help="of the campaign")
         parser.add_argument("files", nargs="*", metavar="FILE", help="for run: recording files or side files")
-        parser.add_argument("--kind", default="fit", choices=["fit", "diagnose"], help="what is asked (default fit)")
-        add_model(parser, required=False)
-        add_fit(parser)
-        parser.set_defaults(multistart=2)
-        parser.add_argument("--engine", default="serial", metavar="NAME", help=f"{', '.join(sorted(engines()))}")
-        parser.add_argument("--workers", type=int, default=2, metavar="N", help="at once (default 2)")
-        parser.add_argument("--scheduler", metavar="ADDRESS", help="of Dask, e.g. tcp://login:8786")
-        parser.add_argument("--limit", type=float, default=0.0, metavar="S", help="seconds a case may take (0: any)")
-        parser.add_argument("--retries", type=int, default=1, metavar="N", help="of a case that died (default 1)")
-        parser.add_argument(
-            "--force", action="store_true", help="for run: put another plan in the place of that in FOLDER"
-        )
-        parser.add_argument("--failed", action="store_true", help="do failed cases again")
-
-        parser.add_argument("--group", metavar="PATTERN", help="for population: what of a sample's name is its group")
+        asked = parser.add_argument_group("for run", "what is asked of every sample, as of `tissuejax fit`")
+        asked.add_argument("--kind", default="fit", choices=["fit", "diagnose"], help="what is asked (default fit)")
+        add_model(asked, required=False)
+        add_fit(asked, multistart=2)
+        asked.add_argument("--limit", type=float, default=0.0, metavar="S", help="seconds a case may take (0: any)")
+        asked.add_argument("--retries", type=int, default=1, metavar="N", help="of a case that died (default 1)")
+        asked.add_argument("--force", action="store_true", help="put another plan in the place of that in FOLDER")
+        how = parser.add_argument_group("for run and resume", "how the cases are worked through")
+        how.add_argument("--engine", default="serial", metavar="NAME", help=f"{', '.join(sorted(engines()))}")
+        how.add_argument("--workers", type=int, default=2, metavar="N", help="at once (default 2)")
+        how.add_argument("--scheduler", metavar="ADDRESS", help="of Dask, e.g. tcp://login:8786")
+        how.add_argument("--failed", action="store_true", help="do failed cases again")
+        among = parser.add_argument_group("for population")
+        among.add_argument("--group", metavar="PATTERN", help="what of a sample's name is its group")
+        parser.add_argument_group("for status and report", "FOLDER says it all; --json as everywhere")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """One of the actions."""
