@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+from tissuejax.cli import main
+
 CALL = """
 from tissuejax.interrupt import stop, watched
 watched("fit")
@@ -34,6 +36,18 @@ def test_ctrl_c_is_enough_once(body):
         _, said = process.communicate(timeout=60)
     assert process.returncode == 130
     assert said == "tissuejax fit: stopped\n"
+
+
+def test_a_campaign_says_how_it_goes_on(monkeypatch, capsys):
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tissuejax.commands.campaign.status", stopped)
+    assert main(["campaign", "status", "c"]) == 130
+    assert capsys.readouterr().err.startswith("tissuejax campaign: stopped; what is finished is kept: ")
+    monkeypatch.setattr("tissuejax.commands.inspecting.names", stopped)
+    assert main(["inspect", "c.h5"]) == 130
+    assert capsys.readouterr().err == "tissuejax inspect: stopped\n"
 
 
 def test_no_worker_is_left_behind():

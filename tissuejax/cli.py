@@ -22,7 +22,7 @@ from tissuejax.commands.problem_file import expanded
 from tissuejax.commands.sentences import Parser, sentence
 from tissuejax.errors import InputError, TissueError
 from tissuejax.families import members
-from tissuejax.interrupt import CODE, stop, watched
+from tissuejax.interrupt import CODE, said, stop, watched
 
 TEACHES = """
 tissuejax identifies the mechanics of soft tissue from recordings, by gradients through the model.
@@ -41,33 +41,34 @@ def commands() -> dict[str, Command]:
 
 
 class Listed(NamedTuple):
-    """What the list of commands says of one, and the module it lives in."""
+    """What the list of commands says of one, what Ctrl-C says of it, and the module it lives in."""
 
     name: str
     summary: str
     order: int
+    stopped: str
     module: str
 
 
 def listed() -> list[Listed]:
     """All sub-commands in the order of the help, read from the syntax of their files and not imported.
 
-    A command brings JAX and the whole package along; the list of them should come at once. That is why name, summary
-    and order of a command are literals.
+    A command brings JAX and the whole package along; the list of them should come at once. That is why name, summary,
+    order and `stopped` of a command are literals.
     """
     found = []
     for path in sorted(Path(package.__path__[0]).glob("*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if not isinstance(node, ast.ClassDef):
                 continue
-            said = {
+            told = {
                 line.target.id: ast.literal_eval(line.value)
                 for line in node.body
                 if isinstance(line, ast.AnnAssign) and line.value is not None and line.target.id in Listed._fields
             }
-            if "name" in said:
-                module = f"{package.__name__}.{path.stem}"
-                found.append(Listed(said["name"], said["summary"], said.get("order", Command.order), module))
+            if "name" in told:
+                plain = {"order": Command.order, "stopped": Command.stopped}
+                found.append(Listed(**plain | told, module=f"{package.__name__}.{path.stem}"))
     return sorted(found, key=lambda c: (c.order, c.name))
 
 
@@ -125,9 +126,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     own, argv = argv is None, list(sys.argv[1:] if argv is None else argv)
     known = {entry.name: entry for entry in listed()}
     name = next((word for word in argv if not word.startswith("-")), "")
+    more = known[name].stopped if name in known else ""
     if own:
         warnings.showwarning = _warned
-        watched(name)
+        watched(name, more)
     try:
         argv = expanded(argv)
         given = parser(name).parse_args(argv)
@@ -144,8 +146,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _refused(name, InputError(sentence(error)), "--json" in argv)
     except KeyboardInterrupt:
         if own:
-            stop(name)
-        print(f"tissuejax {name}: stopped", file=sys.stderr)
+            stop(name, more)
+        print(said(name, more), file=sys.stderr)
         return CODE
     from tissuejax.storage import plain
 

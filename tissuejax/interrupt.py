@@ -19,11 +19,12 @@ CODE = 130
 _kept: list[socket.socket] = []  # a file descriptor lives as long as its socket
 
 
-def watched(name: str) -> None:
+def watched(name: str, more: str = "") -> None:
     """From now on Ctrl-C ends this process, be it in the middle of a compilation; in the main thread of a command.
 
     Args:
         name: of the command, for what is said.
+        more: said beside it.
     """
     heard, (ours, theirs) = threading.Event(), socket.socketpair()
     theirs.setblocking(False)
@@ -36,7 +37,7 @@ def watched(name: str) -> None:
         while signal.SIGINT not in ours.recv(64):
             pass
         if not heard.wait(PATIENT):
-            stop(name)
+            stop(name, more)
 
     signal.signal(signal.SIGINT, hears)
     signal.set_wakeup_fd(theirs.fileno())
@@ -44,9 +45,14 @@ def watched(name: str) -> None:
     threading.Thread(target=waits, daemon=True).start()
 
 
-def stop(name: str) -> NoReturn:
+def said(name: str, more: str = "") -> str:
+    """The line on a command that was stopped."""
+    return f"tissuejax {name}: stopped" + (f"; {more}" if more else "")
+
+
+def stop(name: str, more: str = "") -> NoReturn:
     """Say that a command was stopped, end what works for it, and end the process."""
-    print(f"tissuejax {name}: stopped", file=sys.stderr)
+    print(said(name, more), file=sys.stderr)
     sys.stdout.flush()
     for child in multiprocessing.active_children():
         child.terminate()

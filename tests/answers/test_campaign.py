@@ -2,7 +2,9 @@
 
 import io
 import json
+import logging
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -15,6 +17,7 @@ import pytest
 import tissuejax as tj
 from tests.specimens import recording
 from tissuejax.campaign.child import Child
+from tissuejax.campaign.dask import quiet
 from tissuejax.campaign.run import begin, go_on, status, table
 from tissuejax.campaign.store import Store
 from tissuejax.campaign.task import Settings, TooLong, limited
@@ -308,6 +311,8 @@ def test_a_scheduler_that_dies_loses_nothing_that_was_finished(tmp_path):
         _, said = client.communicate(timeout=300)
         assert client.returncode == 3
         assert "campaign resume" in said
+        assert "Traceback" not in said
+        assert "distributed." not in said
     finally:
         for process in (scheduler, worker):
             process.kill()
@@ -318,6 +323,44 @@ def test_a_scheduler_that_dies_loses_nothing_that_was_finished(tmp_path):
     told = go_on(tmp_path / "c")
     assert told["ran"] == 40 - there
     assert told["done"] == 40
+
+
+def test_the_help_says_which_options_are_for_which_action(capsys):
+    with pytest.raises(SystemExit):
+        main(["campaign", "status", "--help"])
+    parts = re.split(r"^for (.*):$", capsys.readouterr().out, flags=re.M)[1:]
+    options = {verbs: set(re.findall(r"^  (--[a-z-]+)", text, re.M)) for verbs, text in zip(*[iter(parts)] * 2)}
+    assert {"--energy", "--fix", "--limit"} <= options["run"]
+    assert options["run and resume"] == {"--engine", "--workers", "--scheduler", "--failed"}
+    assert options["population"] == {"--group"}
+    assert options["status and report"] == set()
+
+
+def test_dasks_own_log_is_quiet_while_it_works_and_as_before_afterwards():
+    log = logging.getLogger("distributed.client")
+    level = log.level
+    with quiet():
+        assert not log.isEnabledFor(logging.CRITICAL)
+        assert logging.getLogger("tissuejax").isEnabledFor(logging.ERROR)
+    assert log.level == level
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_a_campaign_under_dask_in_one_line(tmp_path):
+    pytest.importorskip("distributed")
+    begin(tmp_path / "c", cohort(tmp_path, 200, bad=False), SETTINGS)
+    run = [sys.executable, "-m", "tissuejax", "campaign", "resume", str(tmp_path / "c"), "--engine", "dask"]
+    client = subprocess.Popen(run, start_new_session=True, stderr=subprocess.PIPE, text=True)
+    begun = time.monotonic()
+    while not list((tmp_path / "c" / "results").rglob("*.json")):
+        assert time.monotonic() - begun < 300
+        time.sleep(0.05)
+    os.killpg(client.pid, signal.SIGINT)  # as a terminal does: workers are in the group
+    _, said = client.communicate(timeout=60)
+    assert client.returncode == 130
+    lines = [line for line in said.splitlines() if not line.startswith("[")]  # "[  12 s] cases 1 of 200": progress
+    assert len(lines) == 1
+    assert "goes on with the rest" in lines[0]
 
 
 @pytest.mark.slow

@@ -3,8 +3,12 @@
 Workers need the same files under the same paths and the campaign's folder, as on a cluster's common file system.
 """
 
+import logging
+import signal
+from collections.abc import Iterator
 from concurrent.futures import CancelledError
-from contextlib import suppress
+from contextlib import ExitStack, contextmanager, suppress
+from multiprocessing import resource_tracker
 from typing import ClassVar
 
 from tissuejax.campaign.engine import Engine, Report, work
@@ -33,28 +37,61 @@ class Dask(Engine):
         except ImportError as error:
             raise InputError("engine dask needs the extra `cluster`: pip install 'tissuejax[cluster]'") from error
         dask.config.set({"distributed.scheduler.allowed-failures": DEATHS, "distributed.worker.daemon": False})
-        cluster = None
-        if where is None:
-            cluster = LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None)
-        try:
-            client = Client(where or cluster, timeout=20)
-        except (OSError, TimeoutError) as error:
-            raise InputError(f"no Dask scheduler answers at {where} ({error}); check the address") from error
         folder = str(store.folder.resolve())
-        try:
-            futures = client.map(work, [folder] * len(tasks), [t.plain() for t in tasks], pure=False, batch_size=1000)
-            for future in as_completed(futures):
-                try:
-                    report(future.result())
-                except KilledWorker:
-                    continue  # left missing; the store counted how often it was begun
-        except (CommClosedError, CancelledError) as error:
-            raise NotConverged(
-                f"the Dask scheduler{f' at {where}' if where else ''} is gone ({error}); what was finished is kept: "
-                "start it again and go on with `tissuejax campaign resume`"
-            ) from error
-        finally:
-            with suppress(TimeoutError, OSError, CommClosedError):
-                client.close(timeout=5)
-            if cluster is not None:
-                cluster.close()
+        with quiet(), ExitStack() as ending:
+            cluster = None
+            if where is None:
+                cluster = LocalCluster(
+                    n_workers=0, threads_per_worker=1, processes=True, dashboard_address=None,
+                    silence_logs=logging.CRITICAL,
+                )  # fmt: skip
+                ending.callback(cluster.close)
+                cluster.sync(deaf)
+                cluster.scale(workers)
+            try:
+                client = Client(where or cluster, timeout=20)
+            except (OSError, TimeoutError) as error:
+                raise InputError(f"no Dask scheduler answers at {where} ({error}); check the address") from error
+            ending.callback(closed, client)
+            plain = [t.plain() for t in tasks]
+            try:
+                futures = client.map(work, [folder] * len(tasks), plain, pure=False, batch_size=1000)
+                for future in as_completed(futures):
+                    try:
+                        report(future.result())
+                    except KilledWorker:
+                        continue  # left missing; the store counted how often it was begun
+            except (CommClosedError, CancelledError) as error:
+                at, again = (f" at {where}", " --scheduler ADDRESS") if where else ("", "")
+                raise NotConverged(
+                    f"the Dask scheduler{at} is gone; what was finished is kept: start it again and go on with "
+                    f"`tissuejax campaign resume {store.folder} --engine dask{again}`"
+                ) from error
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Nothing of Dask's own log in this process: what it would tell is an exception here, or a row of the store."""
+    kept = {}
+    for name in ("distributed", *logging.root.manager.loggerDict):
+        if name.partition(".")[0] == "distributed":
+            kept[name] = logging.getLogger(name).level
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for name, level in kept.items():
+            logging.getLogger(name).setLevel(level)
+
+
+async def deaf() -> None:
+    """Keep Ctrl-C from this thread and from the workers it begins, which inherit that: the client ends them."""
+    if hasattr(signal, "pthread_sigmask"):
+        resource_tracker.ensure_running()  # begun later, it would let the signal in again
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+
+
+def closed(client) -> None:
+    """Close a client whose scheduler may be gone."""
+    with suppress(TimeoutError, OSError):  # a closed channel is an OSError
+        client.close(timeout=5)

@@ -30,6 +30,9 @@ class Campaign(Command):
 
     name: ClassVar[str] = "campaign"
     order: ClassVar[int] = 45
+    stopped: ClassVar[str] = (
+        "what is finished is kept: the same command, or `tissuejax campaign resume FOLDER`, goes on with the rest"
+    )
     summary: ClassVar[str] = "fit or diagnose thousands of samples, on one machine or a cluster; nothing is done twice"
     teaches: ClassVar[str] = """
 Ask one question of every sample of many files. FOLDER holds the plan and one result file a case, under the hash of its

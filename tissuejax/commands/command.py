@@ -32,14 +32,16 @@ class Command(abc.ABC):
         summary: one line for the list of commands.
         teaches: what it does, when to use it, with examples; shown by `tissuejax NAME --help`.
         order: place in the list.
+        stopped: what Ctrl-C says beside "stopped", where a command can go on.
 
-    Name, summary and order are literals: the list of commands is read from the files without importing them.
+    Name, summary, order and stopped are literals: the list of commands is read from the files without importing them.
     """
 
     name: ClassVar[str]
     summary: ClassVar[str]
     teaches: ClassVar[str]
     order: ClassVar[int] = 100
+    stopped: ClassVar[str] = ""
 
     @abc.abstractmethod
     def arguments(self, parser: argparse.ArgumentParser) -> None:
