@@ -1,12 +1,13 @@
 """How many small fits a second, against workers: a campaign of 10,000 neo-Hookean tension tests from a closed form.
 
 Workers share two things: the machine's cores, and the one client that hands cases out. The first is measured by the
-rate once all have started and by the CPU time of a case, the second by the client's own CPU time a case (under Dask the
-scheduler's with it); so on free cores the rate is the smaller of (workers / CPU time of a case) and (1 / client's time
-a case).
+rate of a single worker once it has started, the second by the client's own CPU time a case (under Dask the scheduler's
+with it); so with a core for each worker the rate once all have started is the smaller of (workers times that of one)
+and (1 / client's time a case). What starting costs is in "seconds", "first_after_seconds" and the workers' CPU time.
 
 tissuejax study fits/throughput          (CASES=1000 in the environment for a first look;
-                                          RUNS="processes-1-1000 dask-2-1000": only these, the others' results stay)
+                                          RUNS="processes-1-1000 dask-2-1000": only these, the others' results stay;
+                                          RUNS=none: only the figure, from result.json)
 """
 
 import json
@@ -127,17 +128,18 @@ def main(folder: Path) -> str:
             found[f"{engine}-{workers}-{n}"] = timed(work, engine, workers, n)
             write_json(kept, {"cpus": os.cpu_count(), "runs": list(found.values())})
     runs = list(found.values())
-    write_figure(folder / "figures" / "throughput.png", drawn(runs), dpi=110)
+    write_figure(folder / "figures" / "throughput.png", drawn(runs, json.loads(kept.read_text())["cpus"]), dpi=110)
     last = max(runs, key=lambda r: r["cases"])
     return f"{last['cases']} fits, {last['workers']} workers: {last['per_second']:.1f} a second"
 
 
-def drawn(runs: list[dict]) -> Figure:
-    """Measured rates, and what they would grow to on enough cores."""
+def drawn(runs: list[dict], cpus: int) -> Figure:
+    """Measured rates, and what they would grow to on enough cores: both once all workers have started."""
     figure = Figure(figsize=(6.8, 4.8), layout="constrained")
     ax = figure.subplots()
     most = np.geomspace(1, 1000, 200)
-    one = 1e3 / max(runs, key=lambda r: r["cases"])["workers_cpu_ms_a_case"]  # of a core to itself
+    alone = next(r for r in runs if r["engine"] == "processes" and r["workers"] == 1)
+    one = alone["per_second_started"]  # of a core to itself
     for engine, colour in COLOURS.items():
         of = [r for r in runs if r["engine"] == engine and r["cases"] == PART]
         ceiling = 1e3 / min(r["client_ms_a_case"] for r in of)
@@ -145,7 +147,7 @@ def drawn(runs: list[dict]) -> Figure:
                 color=colour, label=f"{engine}, measured here")  # fmt: skip
         ax.plot(most, np.minimum(one * most, ceiling), "--", color=colour, linewidth=1,
                 label=f"{engine}, on paper: {one:.0f} a core, {ceiling:.0f} a client")  # fmt: skip
-    ax.axvline(os.cpu_count() or 1, color="#8895a0", linewidth=0.8, label=f"cores of this machine ({os.cpu_count()})")
+    ax.axvline(cpus, color="#8895a0", linewidth=0.8, label=f"cores of this machine ({cpus})")
     ax.set(xscale="log", yscale="log", xlabel="workers", ylabel="fits a second, all workers started")
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_formatter(ScalarFormatter())
