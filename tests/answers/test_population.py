@@ -1,5 +1,6 @@
 """A population fit against what made the data, and against closed forms where there is one."""
 
+import csv
 import json
 
 import jax
@@ -10,6 +11,7 @@ from scipy.stats import multivariate_normal
 from tissuejax.campaign.population import Estimates, Population, Runner, estimates, log_likelihood, pooled, population
 from tissuejax.cli import main
 from tissuejax.errors import InputError
+from tissuejax.report.population_page import parameters, write_population
 
 pytest.importorskip("numpyro")
 
@@ -142,11 +144,48 @@ def test_fits_that_say_nothing_are_left_out():
     rows |= {"bound": record(1.0, 1.0, "lower"), "lost": record(1.0, None), "no": record(1.0, 1.0, status="no")}
     of = estimates(rows)
     assert of.samples == ("s0", "s1", "s2", "s3")
+    assert of.left_out == ("bound", "lost", "no")
+    assert of.doubtful == {}
     assert of.positive.all()
     assert of.units == ("Pa",)
     np.testing.assert_allclose(of.covariance.ravel(), 100.0)
+    rows["s2"]["suspect"] = {"misfit": ["the misfit is 7 times the noise"], "unstable": ["it is unstable"]}
+    assert estimates(rows).doubtful == {"s2": "the misfit is 7 times the noise; it is unstable"}
     with pytest.raises(InputError, match="three or more"):
         estimates({"s0": rows["s0"], "bound": rows["bound"]})
+
+
+def test_the_page_names_specimens_and_keeps_one_unit_a_family(tmp_path):
+    """Errors and spread alike: every specimen is half way between its own value and the mean, in logarithms."""
+    names, paths, units = ("a1", "a2", "b1"), ("energy.C10", "energy.C20"), ("Pa", "Pa")
+    values = np.array([[2000.0, 500.0], [4000.0, 500.0], [8000.0, 500.0]])
+    covariance = 0.25 * np.einsum("ni,ij->nij", values**2, np.eye(2))
+    doubts = ("", "the misfit is 7 times the noise", "")
+    of = Estimates(names, paths, values, covariance, np.ones(2, bool), ("a", "a", "b"), units, doubts, ("c1",))
+    many = np.ones((100, 1, 1))
+    known = Population(
+        of, np.tile(np.log([4000.0, 500.0]), (100, 1)), 0.25 * np.eye(2) * many, 0.04 * np.eye(2) * many,
+        np.zeros((100, 2, 2)), 0, 1.0,
+    )  # fmt: skip
+    files = write_population(known, tmp_path)
+    with open(files["specimens"], encoding="utf-8") as file:
+        rows = {row["sample"]: row for row in csv.DictReader(file)}
+    assert rows["a2"]["suspect"] == "the misfit is 7 times the noise"
+    assert (rows["a1"]["group"], rows["b1"]["group"]) == ("a", "b")
+    assert float(rows["a1"]["energy.C10 separate (Pa)"]) == pytest.approx(2000)
+    assert float(rows["a1"]["energy.C10 population (Pa)"]) == pytest.approx((2000 * 4000) ** 0.5)
+    assert float(rows["b1"]["energy.C10 low population (Pa)"]) == pytest.approx(
+        (8000 * 4000) ** 0.5 * np.exp(-1.96 * (0.25 / 2) ** 0.5)
+    )
+    told = parameters(known, known.record())
+    assert [row["unit"] for row in told] == ["kPa", "kPa"]
+    assert told[1]["typical"] == "0.5 (0.5 to 0.5)"
+    assert told[0]["between_specimens"] == "a factor of 1.6 (1.6 to 1.6)"
+    assert told[0]["between_groups"] == "20 % (20 % to 20 %)"
+    page = files["page"].read_text()
+    assert "1 of the 3 fits should not be used as they are" in page
+    assert "1 more left out (at a bound, without an error, or not converged): c1" in page
+    assert "<td>b1</td>" in page
 
 
 @pytest.mark.slow

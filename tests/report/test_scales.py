@@ -1,8 +1,10 @@
 """Quantities as people read them."""
 
+import math
+
 import pytest
 
-from tissuejax.report.scales import display
+from tissuejax.report.scales import common, display, ratio, ratios
 
 
 @pytest.mark.parametrize(
@@ -12,3 +14,13 @@ from tissuejax.report.scales import display
 )  # fmt: skip
 def test_no_thousandths_of_a_pascal(unit, size, shown):
     assert display(unit, size) == shown
+
+
+def test_one_unit_a_family_and_spreads_as_a_factor():
+    kilo = (1e3, "kPa")
+    assert common(["Pa", "1", "Pa", "Pa"], [3900.0, 0.2, 719.0, 2000.0]) == [kilo, (1.0, "1"), kilo, kilo]
+    assert common(["Pa"], [0.0]) == [(1.0, "Pa")]
+    assert ratio(0.056) == "5.6 %"
+    assert ratio(math.log(2.8)) == "a factor of 2.8"
+    assert ratios(math.log(2.8), math.log(2.2), math.log(4.5)) == "a factor of 2.8 (2.2 to 4.5)"
+    assert ratios(0.2, 0.1, math.log(2)) == "20 % (10 % to a factor of 2)"

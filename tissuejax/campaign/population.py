@@ -37,6 +37,8 @@ class Estimates:
         positive: parameters whose logarithm is taken as normal.
         groups: the group of every specimen, or none.
         units: of the parameters.
+        suspect: of every specimen, why its own fit should not be used as it is, empty where it may be; or none.
+        left_out: specimens whose fit is not among these.
     """
 
     samples: tuple[str, ...]
@@ -46,6 +48,13 @@ class Estimates:
     positive: Bool[np.ndarray, " p"]
     groups: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
+    suspect: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def doubtful(self) -> dict[str, str]:
+        """Specimens whose own fit should not be used as it is, and why."""
+        return {name: why for name, why in zip(self.samples, self.suspect) if why}
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -130,6 +139,8 @@ class Population:
         new = self.new()
         return {
             "specimens": len(self.of.samples),
+            "suspect": self.of.doubtful,
+            "left_out": list(self.of.left_out),
             "groups": list(self.of.labels),
             "logarithm": dict(zip(self.of.paths, self.of.positive.tolist(), strict=True)),
             "typical": quantiles(self.of.natural(self.mean)),
@@ -144,7 +155,8 @@ class Population:
 
 def estimates(rows: Mapping[str, dict], groups: Mapping[str, str] | None = None) -> Estimates:
     """Separate fits from records of fits (`Fit.record()`, the answers of a campaign); specimens whose fit did not
-    converge, or has a parameter at a bound or without an error, are left out.
+    converge, or has a parameter at a bound or without an error, are left out. Those that a campaign calls suspect
+    ("suspect", reasons by kind) take part and are named.
 
     Raises:
         InputError: fewer than three usable fits of the same free parameters.
@@ -168,7 +180,10 @@ def estimates(rows: Mapping[str, dict], groups: Mapping[str, str] | None = None)
     covariance = correlation * std[:, :, None] * std[:, None, :]
     labels = tuple(groups[name] for name in used) if groups else ()
     units = tuple(next(iter(used.values()))["parameters"][p]["unit"] for p in paths)
-    return Estimates(tuple(used), paths, values, covariance, (values > 0).all(0), labels, units)
+    doubts = ([why for of_kind in r.get("suspect", {}).values() for why in of_kind] for r in used.values())
+    suspect = tuple("; ".join(said) for said in doubts)
+    left_out = tuple(name for name in rows if name not in used)
+    return Estimates(tuple(used), paths, values, covariance, (values > 0).all(0), labels, units, suspect, left_out)
 
 
 def pooled(of: Estimates) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from tissuejax import verbs
-from tissuejax.campaign.run import begin, engines, go_on, headline, status, table, units
+from tissuejax.campaign.run import begin, doubts, engines, go_on, headline, status, table, units
 from tissuejax.campaign.store import PLAN, Store
 from tissuejax.campaign.task import Settings, first_of
 from tissuejax.commands.arguments import add_fit, add_model, fit_options, positive
@@ -189,30 +189,36 @@ def _report(folder: Path) -> Reply:
 
 def _population(folder: Path, pattern: str | None) -> Reply:
     from tissuejax.campaign.population import estimates, population
-    from tissuejax.report.population_page import write_population
+    from tissuejax.report.population_page import parameters, write_population
 
     store = Store(folder)
-    rows = {t.sample: row["answer"] for t, row in store.rows(store.planned()[0]) if row and row["status"] == "done"}
-    fits = {name: answer for name, answer in rows.items() if "correlation" in answer}
+    fits = {
+        task.sample: row["answer"] | {"suspect": doubts(task, row)}
+        for task, row in store.rows(store.planned()[0])
+        if row and row["status"] == "done" and "correlation" in row["answer"]
+    }
     if not fits:
         raise InputError(f"{folder}: no finished fits (a population is one of fits, not of diagnoses)")
     found = population(estimates(fits, None if pattern is None else _groups(fits, pattern)))
     record = found.record()
     files = write_population(found, folder / "population")
     lines = [f"{record['specimens']} specimens" + (f" in {len(record['groups'])} groups" if record["groups"] else "")]
-    for path in found.of.paths:
-        typical, new = record["typical"][path], record["new_specimen"][path]["95 %"]
-        spread = record["between_specimens"][path]["median"]
-        among = record["between_groups"].get(path, {}).get("median")
-        how = " %" if record["logarithm"][path] else ""
-        factor = 100 if how else 1
-        lines.append(
-            f"  {path:<30}typical {typical['median']:.4g}, spread between specimens {factor * spread:.3g}{how}"
-            + (f", between groups {factor * among:.3g}{how}" if among is not None else "")
-            + f"; a new specimen {new[0]:.4g} to {new[1]:.4g} {found.of.units[found.of.paths.index(path)]}"
-        )
+    lines[0] += f", {len(record['left_out'])} left out" if record["left_out"] else ""
+    if record["suspect"]:
+        first, why = next(iter(record["suspect"].items()))
+        lines[0] += f"; {len(record['suspect'])} of them not to be used as they are (column suspect of specimens.csv)"
+        lines.append(f"  ! {first}: {why}" + (", ..." if len(record["suspect"]) > 1 else ""))
+    for row in parameters(found, record):
+        unit = f" {row['unit']}" if row["unit"] else ""
+        among = f", between groups {row['between_groups']}" if record["groups"] else ""
+        lines += [
+            f"  {row['path']}: typical {row['typical']}{unit}",
+            f"    spread between specimens {row['between_specimens']}{among}",
+            f"    a new specimen {row['new_specimen']}{unit}",
+        ]
     lines += [str(path) for path in files.values()]
-    return Reply(record | {"files": {n: str(p) for n, p in files.items()}}, "\n".join(lines))
+    code = SUSPECT if len(record["suspect"]) == record["specimens"] else 0
+    return Reply(record | {"files": {n: str(p) for n, p in files.items()}}, "\n".join(lines), code)
 
 
 def _groups(names: Iterable[str], pattern: str) -> dict[str, str]:

@@ -7,29 +7,52 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from tissuejax.campaign.population import Population, pooled
+from tissuejax.campaign.population import Estimates, Population, pooled
 from tissuejax.report.plot import BASE, FAINT, HELD, INK, MODEL, Plot, grid, legend_below
-from tissuejax.report.scales import display, label
+from tissuejax.report.scales import common, label
+
+NAMED = 60  # names that an axis takes
+STEPS = 1.96 * np.array([0.0, -1.0, 1.0])  # value, low and high end of 95 %, in standard deviations
+
+
+def intervals(found: Population) -> tuple[Float[np.ndarray, "n 3 p"], Float[np.ndarray, "n 3 p"]]:
+    """(value, low, high) of every specimen, 95 %, SI: by itself, and in the population."""
+    of = found.of
+    x, S = of.working
+    std = np.sqrt(np.einsum("nii->ni", S))
+    mean, own = found.specimens()
+    separate, shrunken = (centre[:, None] + STEPS[:, None] * s[:, None] for centre, s in ((x, std), (mean, own)))
+    return of.natural(separate), of.natural(shrunken)
+
+
+def shown_in(of: Estimates) -> list[tuple[float, str]]:
+    """Divisor and unit of every parameter, in the figure as in the tables: one for all that have the same SI unit."""
+    return common(of.units or ("1",) * len(of.paths), np.median(np.abs(of.values), axis=0).tolist())
 
 
 @dataclass(frozen=True)
 class Shrinkage:
-    """One parameter, in `unit`, specimens sorted by group and value.
+    """One parameter, SI, specimens sorted by group and value.
 
     Attributes:
         separate, shrunken: (value, low, high) of every specimen, 95 %.
         pooled: (value, low, high).
         new: 95 % of new specimens (of a new group, where there are groups).
         ends: where groups end.
+        names: of the specimens, or of the groups where there are any, at `places`.
+        factor, shown: of the unit in which it is drawn: parameters of one unit share it.
     """
 
     path: str
-    unit: str
     separate: Float[np.ndarray, "n 3"]
     shrunken: Float[np.ndarray, "n 3"]
     pooled: Float[np.ndarray, "3"]
     new: Float[np.ndarray, "2"]
     ends: Float[np.ndarray, " g"]
+    names: tuple[str, ...]
+    places: Float[np.ndarray, " g"]
+    factor: float
+    shown: str
 
 
 class PopulationSpread(Plot):
@@ -42,28 +65,20 @@ class PopulationSpread(Plot):
     def prepare(self, subject: Population) -> list[Shrinkage]:
         """Intervals are 1.96 standard deviations in working coordinates, so that positive parameters stay positive."""
         of = subject.of
-        x, S = of.working
-        std = np.sqrt(np.einsum("nii->ni", S))
-        mean, own = subject.specimens()
-        steps = 1.96 * np.array([0.0, -1.0, 1.0])
-        order = np.lexsort((x[:, 0], of.group))
+        order = np.lexsort((of.working[0][:, 0], of.group))
         value, error = pooled(of)
         new = np.quantile(subject.new(), [0.025, 0.975], axis=0)
-        ends = np.flatnonzero(np.diff(of.group[order])) + 0.5
-        separate = of.natural((x[:, None] + steps[:, None] * std[:, None])[order])
-        shrunken = of.natural((mean[:, None] + steps[:, None] * own[:, None])[order])
+        group = of.group[order]
+        ends = np.flatnonzero(np.diff(group)) + 0.5
+        names, places = tuple(of.samples[i] for i in order), np.arange(len(order), dtype=float)
+        if of.groups:
+            names, places = of.labels, np.array([np.mean(places[group == g]) for g in range(len(of.labels))])
+        separate, shrunken = (values[order] for values in intervals(subject))
         return [
-            Shrinkage(
-                path,
-                of.units[k] if of.units else "1",
-                separate[:, :, k],
-                shrunken[:, :, k],
-                value[k] + steps * error[k],
-                new[:, k],
-                ends,
-            )
-            for k, path in enumerate(of.paths)
-        ]
+            Shrinkage(path, separate[:, :, k], shrunken[:, :, k], value[k] + STEPS * error[k], new[:, k], ends, names,
+                      places, *unit)
+            for k, (path, unit) in enumerate(zip(of.paths, shown_in(of), strict=True))
+        ]  # fmt: skip
 
     def caption(self, data: list[Shrinkage]) -> str:
         """What is what."""
@@ -76,8 +91,7 @@ class PopulationSpread(Plot):
         """Specimens side by side."""
         figure, axes = grid(len(data), columns=1, height=3.0)
         for ax, one in zip(axes, data, strict=True):
-            shown = np.concatenate([one.separate[:, 0], one.new])
-            factor, unit = display(one.unit, float(np.median(np.abs(shown))))
+            shown, factor = np.concatenate([one.separate[:, 0], one.new]), one.factor
             at = np.arange(len(one.separate))
             ax.axhspan(*(one.new / factor), color=HELD, alpha=0.15, linewidth=0, label="95 % of new specimens")
             for values, colour, shift, text in (
@@ -94,7 +108,9 @@ class PopulationSpread(Plot):
             room = 0.15 * (high - low)
             ax.set_ylim(low - room, high + room)
             ax.set_xlim(-1, len(at))
-            ax.set_ylabel(f"{one.path.split('.')[-1]}{label(unit)}")
+            ax.set_ylabel(f"{one.path.split('.')[-1]}{label(one.shown)}")
             ax.set_xlabel("specimen")
+            if len(one.names) <= NAMED:
+                ax.set_xticks(one.places, one.names, rotation=90, fontsize=7)
         legend_below(figure, axes)
         return figure

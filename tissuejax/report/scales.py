@@ -1,9 +1,11 @@
 """SI numbers as people read them: kPa instead of 1e3 Pa, value and uncertainty with the digits that mean something."""
 
 import math
+from collections.abc import Sequence
 
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"))
 SCALED = {"Pa", "N", "m", "s"}
+SMALL = 0.3  # spread of a logarithm up to which it is nearly the relative spread
 
 
 def display(unit: str, size: float) -> tuple[float, str]:
@@ -17,6 +19,24 @@ def display(unit: str, size: float) -> tuple[float, str]:
         if (unit != "s" or factor <= 1) and size >= factor:
             return (factor, prefix + unit) if unit != "Pa" or factor >= 1 else (1.0, unit)
     return (1e-6, "u" + unit) if unit != "Pa" else (1.0, unit)
+
+
+def common(units: Sequence[str], sizes: Sequence[float]) -> list[tuple[float, str]]:
+    """`display` of quantities in one table or figure: those of one unit share its prefix, that of their middle size."""
+    of = {unit: sorted(abs(s) for u, s in zip(units, sizes, strict=True) if u == unit and s) for unit in set(units)}
+    return [display(unit, of[unit][len(of[unit]) // 2] if of[unit] else 0.0) for unit in units]
+
+
+def ratio(spread: float) -> str:
+    """A standard deviation of natural logarithms in words: 0.056 is 5.6 %, 1.04 a factor of 2.8."""
+    return f"{100 * spread:.2g} %" if spread <= SMALL else f"a factor of {math.exp(spread):.2g}"
+
+
+def ratios(spread: float, low: float, high: float) -> str:
+    """`ratio` with the ends of its interval."""
+    if min(spread, low, high) > SMALL:
+        return f"{ratio(spread)} ({math.exp(low):.2g} to {math.exp(high):.2g})"
+    return f"{ratio(spread)} ({ratio(low)} to {ratio(high)})"
 
 
 def with_std(value: float, std: float | None) -> str:
