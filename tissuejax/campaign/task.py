@@ -11,7 +11,7 @@ from typing import Any
 
 from tissuejax.cache.key import key
 from tissuejax.errors import InputError, TissueError, unknown
-from tissuejax.recordings.files import names, read
+from tissuejax.recordings.files import names, read, reader
 from tissuejax.recordings.plausible import refuse_unusable, slips
 from tissuejax.recordings.recording import Sample
 
@@ -126,13 +126,13 @@ def _samples(file: str) -> Iterator[tuple[str, Sample | str]]:
     """Every sample of a file by name, or why it can't be read; a file without readable names stands by its own."""
     _refuse_nothing(file)
     try:
-        known = names(file)
+        known, one = reader(file)
     except Exception as error:  # whatever is wrong with one file is its row, and the others go on
         yield os.path.basename(file), why(error)
         return
     for name in known:
         try:
-            sample = read(file, name)
+            sample = one(name)
         except Exception as error:
             sample = why(error)
         yield name, sample

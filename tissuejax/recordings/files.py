@@ -8,8 +8,9 @@ The format is chosen by the content of a file, then by its ending; a new format 
 """
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import tissuejax.recordings as folder
@@ -22,7 +23,7 @@ from tissuejax.recordings.places import refuse_no_file
 from tissuejax.recordings.recording import Sample
 from tissuejax.storage import shown
 
-__all__ = ["formats", "names", "read", "read_all", "write"]
+__all__ = ["formats", "names", "read", "read_all", "reader", "write"]
 
 
 def formats() -> dict[str, Format]:
@@ -72,11 +73,17 @@ def read(path: str | os.PathLike, name: str | None = None) -> Sample:
 
 def read_all(path: str | os.PathLike) -> dict[str, Sample]:
     """Every sample of a file by name, in file order."""
+    known, one = reader(path)
+    return {name: one(name) for name in known}
+
+
+def reader(path: str | os.PathLike) -> tuple[list[str], Callable[[str], Sample]]:
+    """The names of a file's samples, in file order, and what reads one of them; each may be refused by itself."""
     path, chosen = _split(path)
     with _readable(path):
         kind = _format(path)
         known = [chosen] if chosen else kind.names(path)
-    return {name: _one(kind, path, name) for name in known}
+    return known, partial(_one, kind, path)
 
 
 def _one(kind: Format, path: Path, name: str) -> Sample:
