@@ -191,7 +191,7 @@ def test_help_and_the_bare_package_bring_no_jax_along():
 
 def test_commands_listed_without_importing_are_those_there_are():
     assert [(c.name, c.summary, c.order, c.stopped) for c in listed()] == [
-        (c.name, c.summary, c.order) for c in commands().values()
+        (c.name, c.summary, c.order, c.stopped) for c in commands().values()
     ]
 
 
