@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from tissuejax.estimation.covariance import Uncertainty
 from tissuejax.estimation.problem import Problem
+from tissuejax.recordings.marker_motion import ways
 
 Std = dict[str, dict[str, Float[np.ndarray, "n ..."]]]
 
@@ -44,6 +45,27 @@ def fitted_std(problem: Problem, jacobian: Float[np.ndarray, "n p"], spread: Unc
         std = np.full(np.shape(problem.predictor.sample.recordings[recording].channels[channel].values), np.nan)
         std.flat[problem.seen[key]] = carried(jacobian[rows], spread) * problem.sigma(key)
         found.setdefault(recording, {})[channel] = std
+    return found
+
+
+def marker_std(problem: Problem, jacobian: Float[np.ndarray, "n p"], spread: Uncertainty, predicted: Mapping) -> Std:
+    """The same of the mean displacement of the markers that a picture shows: each along its own predicted way.
+
+    Args:
+        jacobian: of `problem.residuals`, as for `fitted_std`.
+        predicted: recordings by name.
+    """
+    found: Std = {}
+    for key, rows in problem.rows.items():
+        places = np.asarray(predicted[key[0]].channels[key[1]].values, float)
+        if places.ndim < 3:
+            continue
+        J = np.full((places.size, jacobian.shape[1]), np.nan)
+        J[problem.seen[key]] = jacobian[rows] * problem.sigma(key)
+        moved = np.einsum("nmip,mi->nmp", J.reshape(*places.shape, -1), ways(places))
+        seen = np.isfinite(moved).all(-1, keepdims=True)
+        count = np.maximum(seen.sum(1), 1)
+        found.setdefault(key[0], {})[key[1]] = carried(np.where(seen, moved, 0.0).sum(1) / count, spread)
     return found
 
 

@@ -29,7 +29,7 @@ from tissuejax.estimation.stability import recorded_stability
 from tissuejax.estimation.transforms import chained, unchained
 from tissuejax.experiments.probing_predictor import ProbingPredictor, make_ready
 from tissuejax.fitting.advice import warnings_of
-from tissuejax.fitting.bands import fitted_std
+from tissuejax.fitting.bands import fitted_std, marker_std
 from tissuejax.fitting.checkpoint import Checkpoint, mark_of
 from tissuejax.fitting.closing import close
 from tissuejax.fitting.result import Fit, Iterate
@@ -163,7 +163,7 @@ def fit_probed(
             name: {c: {"before": before[name][c], "after": rms} for c, rms in channels.items()}
             for name, channels in after.items()
         },
-        curve_std=fitted_std(problem, J, spread),
+        curve_std=_shown_std(problem, J, spread, fitted),
     )
     found.warnings.extend(warnings_of(found))
     if shifts:
@@ -247,6 +247,12 @@ def vector_errors(problem: Problem, residuals: Float[np.ndarray, " n"]) -> dict[
         error = residuals[rows] * problem.sigma((recording, channel))
         found.setdefault(recording, {})[channel] = float(np.sqrt(3 * np.mean(error**2)))
     return found
+
+
+def _shown_std(problem: Problem, J, spread: Uncertainty, fitted: Mapping) -> dict[str, dict[str, np.ndarray]]:
+    """Standard deviation of what a picture shows: every component of the force, of the markers their mean way."""
+    marks = marker_std(problem, J, spread, fitted)
+    return {name: of | marks.get(name, {}) for name, of in fitted_std(problem, J, spread).items()}
 
 
 def _noise_part(problem: Problem, x, J, r) -> Uncertainty:

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 
 from tissuejax.fitting.comparison import Comparison
-from tissuejax.report.plot import INK, MEASURED, SERIES, Plot, clock, grid, legend_below
+from tissuejax.report.plot import INK, MEASURED, SERIES, Plot, grid, legend_below
 from tissuejax.report.scales import display, label
 from tissuejax.report.series import Curve, curves
 
@@ -56,15 +56,15 @@ class ComparisonCurves(Plot):
         for ax, (k, by_time) in zip(axes, panels, strict=True):
             curve = data.measured[k]
             factor, unit = display(curve.unit, float(np.nanmax(np.abs(curve.measured), initial=0.0)))
-            x = curve.time if by_time else curve.drive
-            if x is None:
+            if curve.drive is None and not by_time:
                 ax.set_visible(False)
                 continue
+            x, across = curve.axis(by_time)
             ax.plot(x, curve.measured / factor, ".", color=MEASURED, markersize=3, alpha=0.6, label="measured")
             for colour, (name, every) in zip(SERIES, data.predicted.items(), strict=False):
                 ax.plot(x, every[k] / factor, color=colour, linewidth=1.3, label=name)
             ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontsize=9.5, color=INK)
-            ax.set_xlabel(clock(curve.timed) if by_time else curve.drive_name)
+            ax.set_xlabel(across)
             ax.set_ylabel(f"{curve.channel.replace('_', ' ')}{label(unit)}")
         legend_below(figure, axes, columns=4)
         return figure

@@ -12,7 +12,7 @@ from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.estimation.covariance import inflation
 from tissuejax.estimation.quantile import quantile
 from tissuejax.estimation.series import Segment
-from tissuejax.report.plot import BASE, HELD, INK, MODEL, Plot, clock, grid, legend_below, scatter
+from tissuejax.report.plot import BASE, HELD, INK, MODEL, Plot, band, clock, grid, legend_below, scatter
 from tissuejax.report.scales import display, label
 
 MOST_CURVES = 5
@@ -125,9 +125,8 @@ def _draw(ax, curve: Curve, by_time: bool) -> None:
     colour, kind = (HELD, ", held out") if curve.held else (MODEL, "")
     best = curve.base if curve.improved is None else curve.improved
     scatter(ax, x, curve.measured[thin] / factor)
-    if by_time:
-        low, high = ((best + side * curve.half)[thin] / factor for side in (-1, 1))
-        ax.fill_between(x, low, high, color=colour, alpha=0.22, linewidth=0, label=f"95 % band{kind}", zorder=1)
+    low, high = ((best + side * curve.half)[thin] / factor for side in (-1, 1))
+    band(ax, x, low, high, colour, f"95 % band{kind}")
     line = {"linewidth": 1.3, "zorder": 4}
     if curve.improved is None:
         ax.plot(x, curve.base[thin] / factor, color=colour, label=f"base model{kind}", **line)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from tissuejax.fitting.bands import half_width, prediction_std
 from tissuejax.fitting.result import Fit
-from tissuejax.report.plot import BASE, HELD, INK, MEASURED, MODEL, Plot, clock, grid, legend_below, scatter
+from tissuejax.report.plot import BASE, HELD, INK, MEASURED, MODEL, Plot, band, grid, legend_below, scatter
 from tissuejax.report.scales import display, label
 from tissuejax.report.series import Curve, components, curves
 
@@ -61,7 +61,7 @@ class FitOverlay(Plot):
         return text + (" Orange: recordings that took no part in the fit." if any(s.curve.held for s in data) else "")
 
     def draw(self, data: list[Shown]) -> Figure:
-        """A row a series: left over stretch or shear where there is one, right over time."""
+        """A row a series: left over stretch, shear or depth where there is one, right over time."""
         both = any(s.curve.drive is not None for s in data)
         figure, axes = grid(len(data) * (2 if both else 1), columns=2, height=2.5)
         panels = iter(axes)
@@ -79,31 +79,31 @@ def draw_shown(ax, shown: Shown, by_time: bool) -> None:
     """One series on one axis, with band and bare model."""
     curve = shown.curve
     factor, unit = display(curve.unit, float(np.nanmax(np.abs(curve.measured), initial=0.0)))
-    x = curve.time if by_time else curve.drive
+    x, across = curve.axis(by_time)
     colour, kind = (HELD, "model, held out") if curve.held else (MODEL, "model")
     thin = slice(None, None, max(1, len(x) // DENSE_OVERLAY))
     scatter(ax, x[thin], curve.measured[thin] / factor)
     if shown.bare is not None:
         ax.plot(x, shown.bare / factor, "--", color=BASE, linewidth=1.1, zorder=3, label="effects off")
-    if shown.band is not None and (by_time or curve.monotone):
+    if shown.band is not None:
         low, high = ((curve.predicted + side * shown.band) / factor for side in (-1, 1))
-        ax.fill_between(x, low, high, color=colour, alpha=0.22, linewidth=0, label="95 % band")
+        band(ax, x, low, high, colour, "95 % band, held out" if curve.held else "95 % band")
     ax.plot(x, curve.predicted / factor, color=colour, linewidth=1.3, zorder=4, label=kind)
     ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontsize=9.5, color=INK)
-    ax.set_xlabel(clock(curve.timed) if by_time else curve.drive_name)
+    ax.set_xlabel(across)
     ax.set_ylabel(f"{curve.channel.replace('_', ' ')}{label(unit)}")
 
 
 def draw_curve(ax, curve: Curve, by_time: bool) -> None:
-    """One series on one axis, against time or else against stretch or shear."""
+    """One series on one axis, against time or else against stretch, shear or depth."""
     factor, unit = display(curve.unit, float(np.nanmax(np.abs(curve.measured), initial=0.0)))
-    x = curve.time if by_time else curve.drive
+    x, across = curve.axis(by_time)
     thin = slice(None, None, max(1, len(x) // DENSE_OVERLAY))
     ax.plot(x[thin], curve.measured[thin] / factor, ".", color=MEASURED, markersize=3.5, zorder=2)
     if curve.predicted is not None:
         ax.plot(x, curve.predicted / factor, color=HELD if curve.held else MODEL, linewidth=1.5, zorder=3)
     ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontsize=9.5, color=INK)
-    ax.set_xlabel(clock(curve.timed) if by_time else curve.drive_name)
+    ax.set_xlabel(across)
     ax.set_ylabel(f"{curve.channel.replace('_', ' ')}{label(unit)}")
 
 
@@ -117,16 +117,18 @@ def _bands(found: Fit) -> dict[tuple[str, str], np.ndarray]:
 
 
 def _labelled(found: Fit, series):
-    """((recording, channel label), one column, noise level) of arrays by recording and channel; no clouds of markers,
-    whose mean distance is no column."""
+    """((recording, channel label), one column, noise level) of arrays by recording and channel; a cloud of markers
+    by what is given of its mean way, one number a sample."""
     levels = found.problem.noise.std
     of_channel = {key.split("/")[-1]: s for key, s in levels.items()}
     for name, channels in series.items():
         measured = found.problem.predictor.sample.recordings[name].channels
         for channel, values in channels.items():
-            values = np.asarray(values, float)
+            values, kind = np.asarray(values, float), np.asarray(measured[channel].values)
             level = levels.get(f"{name}/{channel}") or measured[channel].noise_std or of_channel.get(channel)
-            for k, shown in components(channel, values) if values.ndim < 3 else ():
+            if kind.ndim == 3:
+                level = None if level is None else level / np.sqrt(kind.shape[1])
+            for k, shown in components(channel, kind) if values.ndim < 3 else ():
                 yield (name, shown), values if values.ndim == 1 else values[:, k], level
 
 

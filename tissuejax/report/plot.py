@@ -4,7 +4,11 @@ import abc
 from typing import Any, ClassVar
 
 import equinox as eqx
+import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as Outline
+from matplotlib.ticker import ScalarFormatter
 
 INK, FAINT, PAPER = "#22313f", "#8795a1", "#ffffff"
 MODEL, HELD, MEASURED = "#1f6fb2", "#d9730d", "#8a97a3"
@@ -67,6 +71,23 @@ def scatter(ax, x, y) -> None:
     ax.plot(x, y, "o", color=MEASURED, alpha=0.6, markersize=4, markeredgewidth=0, zorder=2, label="measured")
 
 
+def band(ax, x, low, high, colour: str, label: str) -> None:
+    """The area between two curves over `x`, which may turn: one outline, so that what it covers twice is no darker.
+
+    A quadrilateral between neighbours, all turned the same way round, is filled by the nonzero rule: their union.
+    """
+    x, low, high = (np.asarray(v, float) for v in (x, low, high))
+    known = np.isfinite(x) & np.isfinite(low) & np.isfinite(high)
+    i = np.flatnonzero(known[:-1] & known[1:])
+    first, last = np.where(x[i + 1] >= x[i], (i, i + 1), (i + 1, i))
+    ends = ((first, low), (last, low), (last, high), (first, high), (first, low))
+    corners = np.stack([np.stack([x[k], y[k]], 1) for k, y in ends], 1)
+    codes = [Outline.MOVETO, *[Outline.LINETO] * 3, Outline.CLOSEPOLY] * len(i)
+    shape = Outline(corners.reshape(-1, 2), codes or None)
+    ax.add_patch(PathPatch(shape, facecolor=colour, alpha=0.22, linewidth=0, zorder=1, label=label))
+    ax.autoscale_view()
+
+
 def clock(timed: bool) -> str:
     """The name of an axis of time; without a recorded time it counts samples."""
     return "time (s)" if timed else "sample"
@@ -79,6 +100,9 @@ def tidy(ax) -> None:
     ax.tick_params(colors=INK, labelsize=8, length=3, color=FAINT)
     ax.grid(color="#e6ebef", linewidth=0.6)
     ax.set_axisbelow(True)
+    for axis in (ax.xaxis, ax.yaxis):
+        if isinstance(axis.get_major_formatter(), ScalarFormatter):
+            axis.get_major_formatter().set_useOffset(False)  # no "1e-5+5e2" to be added by the reader
     for label in (ax.xaxis.label, ax.yaxis.label, ax.title):
         label.set_color(INK)
         label.set_fontsize(9)

@@ -64,13 +64,15 @@ def _solid(ax, site: Deformed) -> None:
     ball = 1e3 * (
         site.centre[:, None, None] + site.radius * np.stack([np.cos(a) * np.sin(b), np.sin(a) * np.sin(b), np.cos(b)])
     )
-    ax.plot_wireframe(*ball, color="#c0392b", linewidth=0.35, alpha=0.6, zorder=3)
-    ax.scatter(*(1e3 * site.measured.T), color=INK, s=14, depthshade=False, zorder=4)
-    ax.scatter(*(1e3 * site.simulated.T), color=MODEL, marker="x", s=26, depthshade=False, zorder=5)
-    low, high = x.min(0), x.max(0)
-    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], max(high[2], 1e3 * site.centre[2])))
-    sides = np.array([*(high - low)[:2], max(high[2], 1e3 * site.centre[2]) - low[2]])
-    ax.set_box_aspect(np.maximum(sides, 1.0), zoom=1.35)
+    ax.plot_wireframe(*ball, color="#c0392b", linewidth=0.35, alpha=0.6, zorder=3, label="probe")
+    style = {"depthshade": False}
+    ax.scatter(*(1e3 * site.measured.T), color=INK, s=14, zorder=4, label="markers, measured", **style)
+    ax.scatter(*(1e3 * site.simulated.T), color=MODEL, marker="x", s=26, zorder=5, label="markers, simulated", **style)
+    tip = 1e3 * (site.centre + site.radius * np.array([[-1.0], [1.0]]))
+    low, high = np.minimum(x.min(0), tip[0]), np.maximum(x.max(0), tip[1])
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    ax.set_box_aspect(np.maximum(high - low, 1.0), zoom=0.95)  # the longest diagonal of any shape fits
+    ax.legend(fontsize=7, frameon=False, loc="upper left")
     ax.view_init(elev=32, azim=-60)
     ax.set_axis_off()
     ax.set_title(f"{site.name}, t = {site.time:.2f} s", loc="left", fontsize=9.5, color=INK)

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from tissuejax.fitting.result import Fit
 from tissuejax.report.fit_overlay import DENSE_OVERLAY, PANELS
-from tissuejax.report.plot import HELD, INK, MODEL, Plot, clock, grid, legend_below
+from tissuejax.report.plot import HELD, INK, MODEL, Plot, grid, legend_below
 from tissuejax.report.series import Curve, curves
 
 
@@ -34,18 +34,17 @@ class Residuals(Plot):
         )
 
     def draw(self, data: list[tuple[Curve, np.ndarray]]) -> Figure:
-        """Against stretch, shear or time as in the overlay."""
+        """Against stretch or shear; of a probing and of a test that rests against time."""
         figure, axes = grid(len(data), height=2.2)
         for ax, (curve, r) in zip(axes, data, strict=True):
-            by_time = curve.drive is None or curve.held_still
-            x = curve.time if by_time else curve.drive
+            x, across = curve.axis(curve.drive is None or curve.held_still or curve.drive_unit != "1")
             thin = slice(None, None, max(1, len(x) // DENSE_OVERLAY))
             ax.axhspan(-1.96, 1.96, color="#e9edf0", zorder=0, label="95 % of the noise")
             ax.axhline(0, color=INK, linewidth=0.6)
             ax.plot(x[thin], r[thin], ".", color=HELD if curve.held else MODEL, markersize=3,
                     label="held out" if curve.held else "fitted")  # fmt: skip
             ax.set_title(f"{curve.recording}{' (held out)' if curve.held else ''}", loc="left", fontsize=9.5, color=INK)
-            ax.set_xlabel(clock(curve.timed) if by_time else curve.drive_name)
+            ax.set_xlabel(across)
             ax.set_ylabel(f"{curve.channel.replace('_', ' ')}\nresidual / noise")
         legend_below(figure, axes)
         return figure

@@ -1,15 +1,19 @@
 """Measured and predicted channels cut into plain curves, the common food of the plots of a fit."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from tissuejax.fitting.result import Fit
+from tissuejax.recordings.marker_motion import along, ways
 from tissuejax.recordings.recording import Channel, Recording
+from tissuejax.report.scales import display, label
 
 AXES_OF = {"force": "xyz", "nominal_stress": "12"}
 DRIVES = ("stretch", "shear")
+MARKERS = "marker displacement, mean"  # the series that a cloud of markers is shown as
 
 
 @dataclass(frozen=True)
@@ -19,8 +23,8 @@ class Curve:
     Attributes:
         recording, channel: where it belongs, with the component in the channel's label.
         time: s.
-        drive: stretch or shear at these times, or None.
-        drive_name: its name.
+        drive: stretch or shear at these times, of a probing the depth (or the travel down) in m, or None.
+        drive_name, drive_unit: its name and SI unit.
         measured, predicted: in `unit`.
         std: noise in `unit`, or None.
         held: True if the recording took no part in the fit.
@@ -38,6 +42,14 @@ class Curve:
     std: float | None
     held: bool = False
     timed: bool = True
+    drive_unit: str = "1"
+
+    def axis(self, by_time: bool) -> tuple[Float[np.ndarray, " n"], str]:
+        """What it is drawn over, in readable units, and the words for that axis."""
+        if by_time:
+            return self.time, "time (s)" if self.timed else "sample"
+        factor, unit = display(self.drive_unit, float(np.nanmax(np.abs(self.drive), initial=0.0)))
+        return self.drive / factor, f"{self.drive_name}{label(unit)}"
 
     @property
     def monotone(self) -> bool:
@@ -59,30 +71,38 @@ class Curve:
 
 
 def curves_of(
-    recording: Recording, prediction: Recording | None = None, std=None, held: bool = False, timed: bool = True
+    recording: Recording,
+    prediction: Recording | None = None,
+    std=None,
+    held: bool = False,
+    timed: bool = True,
+    touch: float | None = None,
 ) -> list[Curve]:
-    """All scalar series of a recording; clouds of markers as their mean displacement, each along its own way."""
+    """All scalar series of a recording; clouds of markers as their mean displacement, each along its own way.
+
+    Args:
+        recording, prediction: what was measured and, of a fit, predicted.
+        std: noise by "recording/channel", before what the recording says.
+        held, timed: see `Curve`.
+        touch: of a probing, when the undeformed surface is met, s: depth counts from there.
+    """
     found = []
     for name, channel in recording.channels.items():
         other = prediction.channels.get(name) if prediction is not None else None
         measured = np.asarray(channel.values, float)
         predicted = None if other is None else np.asarray(other.values, float)
         level = (std or {}).get(f"{recording.name}/{name}", channel.noise_std)
-        drive_name, drive = _drive(recording, channel)
+        drive_name, drive, drive_unit = _drive(recording, channel, touch)
         if measured.ndim == 3:
-            shown, modelled = displacements(measured, predicted)
             level = None if level is None else level / np.sqrt(measured.shape[1])
-            time = np.asarray(channel.time, float)
-            label = components(name, measured)[0][1]
-            found.append(Curve(recording.name, label, time, None, "", shown, modelled, channel.unit, level, held))
-            continue
-        for k, label in components(name, measured):
+            measured, predicted = displacements(measured, predicted)
+        for k, shown in components(name, np.asarray(channel.values)):
             own = drive[:, k] if drive is not None and drive.ndim == 2 and measured.ndim == 2 else drive
             own = None if own is None or own.ndim != 1 else own
             found.append(
                 Curve(
                     recording.name,
-                    label,
+                    shown,
                     np.asarray(channel.time, float),
                     own,
                     drive_name,
@@ -92,6 +112,7 @@ def curves_of(
                     level,
                     held,
                     timed,
+                    drive_unit,
                 )
             )
     return found
@@ -103,19 +124,30 @@ def curves(found: Fit) -> list[Curve]:
     measured = sample.recordings
     inside = found.problem.predictor.names
     held = [name for name in found.predictions if name not in inside]
+    setups = getattr(found.problem.predictor, "setups", {})
+    touch = {name: float(setup.test.first_touch) for name, setup in setups.items()}
     return [
         curve
         for name in (*inside, *held)
-        for curve in curves_of(measured[name], found.predictions[name], std, name in held, sample.timed)
+        for curve in curves_of(
+            measured[name], found.predictions[name], std, name in held, sample.timed, touch.get(name)
+        )
     ]
 
 
-def _drive(recording: Recording, channel: Channel) -> tuple[str, np.ndarray | None]:
+def _drive(recording: Recording, channel: Channel, touch: float | None) -> tuple[str, np.ndarray | None, str]:
+    """What was done at a channel's times: name, values, SI unit."""
     for name in DRIVES:
         drive = recording.inputs.get(name)
         if drive is not None and len(drive) == len(channel.time):
-            return name, np.asarray(drive, float)
-    return "", None
+            return name, np.asarray(drive, float), "1"
+    if "probe/position" not in recording.inputs:
+        return "", None, "1"
+    time, height = (np.asarray(recording.inputs[f"probe/{k}"], float) for k in ("time", "position"))
+    down = -np.interp(np.asarray(channel.time, float), time, height[:, 2])
+    if touch is None or not np.isfinite(touch):
+        return "travel of the probe downwards", down + height[0, 2], "m"
+    return "depth", down + np.interp(touch, time, height[:, 2]), "m"
 
 
 def components(name: str, values: np.ndarray) -> list[tuple[int, str]]:
@@ -123,33 +155,22 @@ def components(name: str, values: np.ndarray) -> list[tuple[int, str]]:
     if values.ndim == 2:
         axes = AXES_OF.get(name, "0123456789")
         return [(k, f"{name} {axes[k] if k < len(axes) else k}") for k in range(values.shape[1])]
-    return [(0, "marker displacement" if values.ndim == 3 else name)]
+    return [(0, MARKERS if values.ndim == 3 else name)]
 
 
 def displacements(
     measured: Float[np.ndarray, "n m 3"], predicted: Float[np.ndarray, "n m 3"] | None
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"] | None]:
-    """Mean over the markers of how far each has gone along its own way: the direction in which it is farthest out.
+    """Mean over the markers of how far each has gone along its own way (`recordings.marker_motion`).
 
-    Unlike a mean of distances this is zero, but for noise, while nothing moves. The way is the prediction's where there
-    is one; each series starts from its own rest (the measured one from the median of its first frames).
+    The way is the prediction's where there is one; each series starts from its own rest.
     """
-    guide = measured if predicted is None else predicted
-    out = guide - _rest(guide)
-    far = int(np.argmax(np.nansum(np.linalg.norm(out, axis=-1), axis=1)))
-    near = out[max(0, far - 2) : far + 3]
-    way = np.nanmean(near, axis=0)
-    way = way / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-300)
-    modelled = None if predicted is None else np.nanmean(np.einsum("nmi,mi->nm", out, way), axis=1)
-    shown = np.einsum("nmi,mi->nm", measured - _rest(measured), way)
-    lost = ~np.isfinite(shown).any(1)
-    return np.where(lost, np.nan, np.nanmean(np.where(lost[:, None], 0.0, shown), axis=1)), modelled
+    way = ways(measured if predicted is None else predicted)
+    modelled = None if predicted is None else np.nanmean(along(predicted, way), axis=1)
+    return over_seen(along(measured, way), np.nanmean), modelled
 
 
-def _rest(places: np.ndarray) -> np.ndarray:
-    """Where each marker was first seen: the median of its first five frames."""
-    seen = np.full(places.shape[1:], 0.0)
-    for j in range(places.shape[1]):
-        known = places[np.isfinite(places[:, j]).all(1), j]
-        seen[j] = np.median(known[:5], axis=0) if len(known) else np.nan
-    return seen
+def over_seen(moved: Float[np.ndarray, "n m"], reduce: Callable) -> Float[np.ndarray, " n"]:
+    """A reduction over the markers seen in each frame (`np.nanmean`, ...); NaN where none was."""
+    lost = ~np.isfinite(moved).any(1)
+    return np.where(lost, np.nan, reduce(np.where(lost[:, None], 0.0, moved), axis=1))
