@@ -120,8 +120,11 @@ def test_four_digits_stay_whatever_the_error(value):
 def test_curves_and_table_are_written(found, tmp_path):
     rows = list(csv.DictReader(write_curves(found, tmp_path / "curves.csv").read_text().splitlines()))
     assert len(rows) == 60
-    assert float(rows[30]["drive"]) == pytest.approx(STRETCH[30])
-    assert float(rows[30]["model"]) == pytest.approx(found.values["energy.mu"] * (STRETCH[30] - STRETCH[30] ** -2))
+    assert float(rows[30]["stretch (1)"]) == pytest.approx(STRETCH[30])
+    assert float(rows[30]["model (Pa)"]) == pytest.approx(found.values["energy.mu"] * (STRETCH[30] - STRETCH[30] ** -2))
+    half = FitOverlay().prepare(found)[0].band
+    assert float(rows[30]["half-width of the 95 % band (Pa)"]) == pytest.approx(half[30])
+    assert "effects off (Pa)" not in rows[0]  # there is no effect
     latex = write_latex(found, tmp_path / "t.tex").read_text()
     assert latex.startswith(r"\begin{tabular}")
     assert "energy.mu & " in latex

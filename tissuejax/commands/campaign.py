@@ -16,7 +16,7 @@ from tissuejax.campaign.store import PLAN, Store
 from tissuejax.campaign.task import Settings, first_of
 from tissuejax.commands.arguments import add_fit, add_model, fit_options, positive
 from tissuejax.commands.command import SUSPECT, Command, Reply
-from tissuejax.commands.outputs import WITH_A_PAGE
+from tissuejax.commands.outputs import WITH_A_PAGE, listed
 from tissuejax.errors import InputError
 from tissuejax.fitting.options import Objective, Search
 from tissuejax.progress import for_terminal
@@ -184,7 +184,7 @@ def _report(folder: Path) -> Reply:
     writer.writerows(rows)
     files = {"table": write_text(folder / "cases.csv", text.getvalue())} | write_cohort(rows, status(folder), folder)
     counts = status(folder) | {"files": {n: str(p) for n, p in files.items()}}
-    return Reply(counts, "\n".join([_text(counts), *(str(p) for p in files.values())]), _code(counts))
+    return Reply(counts, "\n".join([_text(counts), *listed(files)]), _code(counts))
 
 
 def _population(folder: Path, pattern: str | None) -> Reply:
@@ -216,7 +216,7 @@ def _population(folder: Path, pattern: str | None) -> Reply:
             f"    spread between specimens {row['between_specimens']}{among}",
             f"    a new specimen {row['new_specimen']}{unit}",
         ]
-    lines += [str(path) for path in files.values()]
+    lines += listed(files)
     code = SUSPECT if len(record["suspect"]) == record["specimens"] else 0
     return Reply(record | {"files": {n: str(p) for n, p in files.items()}}, "\n".join(lines), code)
 

@@ -34,7 +34,8 @@ support: AIC, BIC, Akaike weights, error of what was held out, and all curves ov
   tissuejax compare out/a/result.json out/b/result.json       fits made before; refused if their data differ
 
 --fix, --start, --bounds, --prior and --free act on the models that have the parameter. Into --out go comparison.json,
-comparison.csv, report.html and the figures; a model that can't be fitted is listed with its reason.
+comparison.csv and .tex (SI), report.html, the figures (PNG; SVG and PDF in print/) and, of fits made here, their curves
+as curves.csv; a model that can't be fitted is listed with its reason.
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:

@@ -46,8 +46,8 @@ shown come from a fit to the others, with nothing fitted to those held out.
   tissuejax diagnose rubber.toml --energy ogden-3 --ogden-form mu/alpha --effect viscoelasticity --effect softening
 
 What is written into --out: result.json (every number), report.html (one page to read and keep), remainder.json (what is
-still left, as smooth functions of drive, rate, time and place), evidence.json (every set weighed) and the figures as
-PNG. Probings take minutes; one that was stopped goes on where it was when the same command is given again. Material
+still left, as smooth functions of drive, rate, time and place), evidence.json (every set weighed), the figures (PNG; SVG
+and PDF in print/), curves.csv (the first figure in numbers, SI) and parameters.tex. Probings take minutes; one that was stopped goes on where it was when the same command is given again. Material
 tests and cuts begin anew.
 """
 

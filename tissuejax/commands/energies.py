@@ -7,7 +7,7 @@ from typing import ClassVar
 from tissuejax import verbs
 from tissuejax.commands.arguments import values
 from tissuejax.commands.command import Command, Reply
-from tissuejax.commands.outputs import folder_named
+from tissuejax.commands.outputs import folder_named, listed
 from tissuejax.commands.results import refuse_softening
 from tissuejax.energies.catalogue import entries, entries_of
 from tissuejax.energies.published import PUBLISHED
@@ -105,4 +105,4 @@ fibre family to any of them. Ogden constants mean nothing without their form, so
         material = Material(model, model.defaults | wanted, within)
         written = write_figures(material, given.out / given.plot)
         record = {"energy": given.plot, "values": material.values, "files": {n: str(p) for n, p in written.items()}}
-        return Reply(record, "\n".join(str(p) for p in written.values()))
+        return Reply(record, "\n".join(listed(written)))

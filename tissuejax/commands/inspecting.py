@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from tissuejax.commands.command import Command, Reply
-from tissuejax.commands.outputs import folder_named
+from tissuejax.commands.outputs import folder_named, listed
 from tissuejax.experiments.probing_slips import probing_slips
 from tissuejax.recordings.files import names, read
 from tissuejax.recordings.layouts import LAYOUTS
@@ -60,7 +60,7 @@ what is wrong with a file.
             if (cut := _cut(given.file, sample.name)) is not None:
                 written |= write_figures(cut, given.out)
         record["files"] = {name: str(path) for name, path in written.items()}
-        return Reply(record, "\n".join([*text_of(record), *(f"figure {p}" for p in written.values())]))
+        return Reply(record, "\n".join([*text_of(record), *(f"figure {p}" for p in listed(written))]))
 
 
 def _cut(file: str, name: str):

@@ -6,7 +6,7 @@ same folder is refused.
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,13 @@ WITH_A_PAGE = ("result.json", "comparison.json", "campaign.json")
 
 
 ENDINGS = {".png", ".svg", ".pdf", ".csv", ".json", ".html", ".h5", ".txt", ".inp", ".xlsx", ".mat"}
+
+
+def listed(files: Mapping[str, Path]) -> list[str]:
+    """Paths for a reader; of the SVG and PDF of every figure one line tells."""
+    plain = [str(p) for p in files.values() if p.parent.name != "print"]
+    printed = sorted({str(p.parent) for p in files.values() if p.parent.name == "print"})
+    return plain + [f"{folder} (the figures as SVG and PDF)" for folder in printed]
 
 
 def folder_named(text: str) -> Path:

@@ -8,7 +8,7 @@ import numpy as np
 from tissuejax import verbs
 from tissuejax.commands.arguments import add_fit, add_model, fit_options, positive
 from tissuejax.commands.command import Command, Reply
-from tissuejax.commands.outputs import add_out, folder, made
+from tissuejax.commands.outputs import add_out, folder, listed, made
 from tissuejax.errors import unknown
 from tissuejax.fitting.result import described
 from tissuejax.progress import for_terminal
@@ -29,7 +29,8 @@ class PosteriorCommand(Command):
 Fit a material test, then draw from the posterior of its parameters: a flat prior between the bounds, or the normal one
 of --prior. laplace takes a second and says by k-hat whether it may be believed (below 0.7, or all weights alike); nuts
 takes longer and needs no such luck. --evidence adds ln Z (proper priors for all parameters, at most ten of them).
-Written: posterior.json, posterior.nc (arviz InferenceData, for arviz.plot_pair and the like), posterior.png.
+Written: posterior.json, posterior.nc (arviz InferenceData, for arviz.plot_pair and the like), posterior.png (SVG and
+PDF in print/), parameters.tex.
 
   tissuejax posterior tension.h5 --energy demiray
   tissuejax posterior tension.h5 --energy demiray --sampler nuts --draws 1000
@@ -53,7 +54,7 @@ Needs the extra `bayes`: pip install 'tissuejax[bayes]'.
         """Fit, draw, write."""
         from tissuejax.fitting.evidence import evidence
         from tissuejax.fitting.posterior import laplace, nuts, target_of
-        from tissuejax.report.posterior_pairs import Drawn
+        from tissuejax.report.posterior_pairs import Drawn, write_latex
 
         if given.sampler not in SAMPLERS:
             raise unknown("sampler", given.sampler, SAMPLERS)
@@ -79,7 +80,8 @@ Needs the extra `bayes`: pip install 'tissuejax[bayes]'.
         with replacing(out / "posterior.nc") as temporary:
             draws_made.arviz().to_netcdf(str(temporary))
         files["arviz"] = out / "posterior.nc"
-        files |= write_figures(Drawn(found, draws_made), out)
+        drawn = Drawn(found, draws_made)
+        files |= write_figures(drawn, out) | {"table": write_latex(drawn, out / "parameters.tex")}
         units = {p: model.parameters[p].unit for p in found.free}
         lines = [f"{'parameter':<36}{'mean':>12}{'std':>12}  95 %"]
         for path, row in record["parameters"].items():
@@ -89,5 +91,5 @@ Needs the extra `bayes`: pip install 'tissuejax[bayes]'.
         lines.append(", ".join(f"{k} {v:.3g}" for k, v in record["checks"].items()))
         if given.evidence:
             lines.append(f"ln evidence {z.log_evidence:.2f} ± {z.std:.2f}")
-        lines += [f"  ! {w}" for w in record["warnings"]] + ["", *(str(p) for p in files.values())]
+        lines += [f"  ! {w}" for w in record["warnings"]] + ["", *listed(files)]
         return Reply(record | {"files": {n: str(p) for n, p in files.items()}}, "\n".join(lines))

@@ -7,14 +7,14 @@ from typing import ClassVar
 from tissuejax import verbs
 from tissuejax.commands.arguments import add_fit, add_model, fit_options
 from tissuejax.commands.command import Command, Reply
-from tissuejax.commands.outputs import add_out, folder, made
+from tissuejax.commands.outputs import add_out, folder, listed, made
 from tissuejax.errors import unknown
 from tissuejax.fitting.profile import profile
 from tissuejax.fitting.result import described
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read
 from tissuejax.report.page import write_figures
-from tissuejax.report.profiles import Profiles
+from tissuejax.report.profiles import Profiles, write_profiles
 from tissuejax.storage import write_json
 
 
@@ -79,14 +79,15 @@ no parabola; where it does not close, the data do not bound the parameter on tha
         files = {
             "result": write_json(out / "profiles.json", {"made": mine, "profiles": rows, "warnings": found.warnings})
         }
-        files |= write_figures(Profiles(found, tuple(profiles)), out)
+        drawn = Profiles(found, tuple(profiles))
+        files |= write_figures(drawn, out) | {"curves": write_profiles(drawn, out / "profiles.csv")}
         lines = [f"{'parameter':<36}{'estimate':>12}  {'95 % by profile':<28}{'by standard error'}"]
         for path, t in rows.items():
             ends, normal = (" to ".join(_end(e) for e in t[key]) for key in ("interval", "normal"))
             lines.append(
                 f"{path:<36}{t['value']:>12.5g}  {ends:<28}{normal}{'' if t['unit'] == '1' else ' ' + t['unit']}"
             )
-        lines += [f"  ! {w}" for w in found.warnings] + ["", *(str(p) for p in files.values())]
+        lines += [f"  ! {w}" for w in found.warnings] + ["", *listed(files)]
         record = {"profiles": rows, "warnings": found.warnings, "files": {n: str(p) for n, p in files.items()}}
         return Reply(record, "\n".join(lines), 0 if found.converged else 3)
 

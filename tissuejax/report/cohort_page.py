@@ -5,8 +5,8 @@ from typing import Any
 
 from tissuejax.campaign.run import headline
 from tissuejax.report.cohort import Cohort
-from tissuejax.report.page import figures, render
-from tissuejax.storage import write_bytes, write_text
+from tissuejax.report.page import figures, render, write_drawn
+from tissuejax.storage import write_text
 
 ROWS = 200  # rows on the page; all are in the table
 
@@ -20,5 +20,4 @@ def write_cohort(rows: list[dict[str, Any]], counts: dict[str, Any], out: Path) 
         "cohort.html.j2", title=f"Campaign {name}", lead=headline(counts), counts=counts, rows=rows[:ROWS],
         columns=columns, most=ROWS, figures=drawn,
     )  # fmt: skip
-    written = {f["name"]: write_bytes(out / f"{f['name']}.png", f["png"]) for f in drawn}
-    return written | {"page": write_text(out / "report.html", page)}
+    return write_drawn(drawn, out) | {"page": write_text(out / "report.html", page)}

@@ -136,10 +136,38 @@ def lines(found: Comparison) -> list[dict[str, str]]:
     ]
 
 
+def numbers(found: Comparison) -> list[dict[str, float | str | None]]:
+    """Rows of the table as numbers, SI; the criteria as differences from the least."""
+    best = min(r.aic for r in found.rows), min(r.bic for r in found.rows)
+    return [
+        {
+            "model": r.name,
+            "free parameters": r.free,
+            "samples": r.n,
+            "AIC - least AIC": r.aic - best[0],
+            "BIC - least BIC": r.bic - best[1],
+            "Akaike weight": r.weight,
+            "chi-square per degree of freedom": r.chi2_per_dof,
+        }
+        | {f"RMSE fitted ({unit})": error for unit, error in r.fitted.items()}
+        | {f"RMSE held out ({unit})": error for unit, error in r.held.items()}
+        | {
+            "converged": int(r.status == "converged"),
+            "parameters at a bound": len(_bounds(r)),
+            "open directions": len(r.warnings) - len(_bounds(r)),
+        }
+        for r in found.rows
+    ]
+
+
+def _bounds(row: Row) -> list[str]:
+    return [w for w in row.warnings if w.endswith(" bound")]
+
+
 def _note(row: Row) -> str:
     """What to know of a fit before taking it, briefly: its own page says it all."""
     said = [] if row.status == "converged" else [f"not converged: {row.status}."]
-    bounds = [w for w in row.warnings if w.endswith(" bound")]
+    bounds = _bounds(row)
     others = [w for w in row.warnings if w not in bounds]
     said += [f"{', '.join(bounds)}."] * bool(bounds) + others[:NOTED]
     if len(others) > NOTED:

@@ -1,16 +1,14 @@
 """What a page says and shows of a fit of cuts: a sentence, the numbers, and the record over time and over the way."""
 
-import csv
-import io
 from pathlib import Path
 
 import numpy as np
 
 from tissuejax.fitting.cut_result import ENERGY, FRICTION, ONSET, STRENGTH, CutFit
-from tissuejax.report.fit_tables import escaped
+from tissuejax.report.fit_tables import PARAMETERS
+from tissuejax.report.numbers import write_series, write_tabular
 from tissuejax.report.plot import INK, MEASURED, MODEL, grid, legend_below
 from tissuejax.report.scales import display
-from tissuejax.storage import write_text
 
 CHANNEL = "cutting_force"
 NORMAL_95 = 1.96  # standard deviations of the noise in which 95 % of the samples are
@@ -115,21 +113,10 @@ def overlay(found: CutFit):
 
 def write_curves(found: CutFit, path: Path) -> Path:
     """The figure's numbers as CSV, SI: one row a sample."""
-    text = io.StringIO()
-    writer = csv.writer(text)
-    for n, name in enumerate(found.predictor.names):
-        s = series(found, name)
-        if n == 0:
-            writer.writerow(["recording", *s])
-        for numbers in zip(*s.values(), strict=True):
-            writer.writerow([name, *(f"{x:.9g}" if np.isfinite(x) else "" for x in numbers)])
-    return write_text(path, text.getvalue())
+    return write_series(path, (({"recording": name}, series(found, name)) for name in found.predictor.names))
 
 
 def write_latex(found: CutFit, path: Path) -> Path:
     r"""A `tabular` of the parameters."""
-    lines = [r"\begin{tabular}{lrrl}", r"parameter & value & 95\,\% interval & unit \\ \hline"]
-    for row in rows(found):
-        value = f"{row['value']} ± {row['std'].split(',')[0]}" if row["std"] else row["value"]
-        lines.append(" & ".join(map(escaped, (row["path"], value, row["note"], row["unit"]))) + r" \\")
-    return write_text(path, "\n".join([*lines, r"\end{tabular}"]) + "\n")
+    with_error = ((r, f"{r['value']} ± {r['std'].split(',')[0]}" if r["std"] else r["value"]) for r in rows(found))
+    return write_tabular(path, PARAMETERS, ((r["path"], value, r["note"], r["unit"]) for r, value in with_error))

@@ -9,9 +9,9 @@ from tissuejax.fitting.cut_result import CutFit
 from tissuejax.fitting.sawtooth import SECTIONS, Sawtooth
 from tissuejax.recordings.recording import Sample
 from tissuejax.report import cut_fit
-from tissuejax.report.page import png, printable, render
+from tissuejax.report.page import png, render, write_drawn
 from tissuejax.report.plot import MEASURED, MODEL, SERIES, grid
-from tissuejax.storage import write_bytes, write_json, write_text
+from tissuejax.storage import write_json, write_text
 
 
 def write_cut(
@@ -35,14 +35,14 @@ def write_cut(
         pictures.append(("along", "Toughness along the path.", _field(field)))
     written = {"result": write_json(out / "result.json", record)}
     drawn = [{"name": n, "caption": text, "png": png(f), "figure": f} for n, text, f in pictures]
-    written |= {d["name"]: write_bytes(out / f"{d['name']}.png", d["png"]) for d in drawn}
+    written |= write_drawn(drawn, out)
     lines, said = ([], []) if found is None else (cut_fit.rows(found), cut_fit.sentences(found))
     page = render("cutting.html.j2", title=f"{sample.name}: cut", said=said, rows=lines, figures=drawn)
     written["page"] = write_text(out / "report.html", page)
     if found is not None:
         written["curves"] = cut_fit.write_curves(found, out / "curves.csv")
         written["table"] = cut_fit.write_latex(found, out / "parameters.tex")
-    return written | printable(drawn, out)
+    return written
 
 
 def _saw(teeth):

@@ -6,13 +6,14 @@ from tissuejax.diagnosis.judgement.evidence import write_evidence
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.report import diagnosis_sentences as sentences
 from tissuejax.report import judged_sentences as judged
+from tissuejax.report.diagnosis_tables import write_curves, write_latex
 from tissuejax.report.headline import headline
-from tissuejax.report.page import figures, render
-from tissuejax.storage import write_bytes, write_json, write_text
+from tissuejax.report.page import figures, render, write_drawn
+from tissuejax.storage import write_json, write_text
 
 
 def write_diagnosis(found: Diagnosis, out: Path, remainders: bool = True) -> dict[str, Path]:
-    """result.json, remainder.json, report.html and one PNG a figure, each written whole or not at all.
+    """result.json, remainder.json, report.html, the figures, curves.csv and parameters.tex, each whole or not at all.
 
     Args:
         found: the diagnosis.
@@ -20,7 +21,8 @@ def write_diagnosis(found: Diagnosis, out: Path, remainders: bool = True) -> dic
         remainders: False leaves remainder.json out, which holds the residual sample by sample.
 
     Returns:
-        Paths by name: "result", "remainder", "page" and the figures.
+        Paths by name: "result", "remainder", "evidence", "page", "curves", "table", and the figures by name and by name
+        and format.
     """
     out = Path(out)
     record = found.as_dict()
@@ -29,7 +31,7 @@ def write_diagnosis(found: Diagnosis, out: Path, remainders: bool = True) -> dic
         written["remainder"] = write_json(out / "remainder.json", found.remainders())
     written["evidence"] = write_evidence(found.answered.evidence, out / "evidence.json")
     drawn = figures(found)
-    written |= {f["name"]: write_bytes(out / f"{f['name']}.png", f["png"]) for f in drawn}
+    written |= write_drawn(drawn, out)
     page = render(
         "diagnosis.html.j2",
         title=f"Diagnosis of {found.sample}",
@@ -49,4 +51,6 @@ def write_diagnosis(found: Diagnosis, out: Path, remainders: bool = True) -> dic
         figures={f["name"]: f for f in drawn},
     )
     written["page"] = write_text(out / "report.html", page)
+    written["curves"] = write_curves(found, out / "curves.csv")
+    written["table"] = write_latex(found, out / "parameters.tex")
     return written

@@ -46,9 +46,9 @@ def png(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def printable(drawn: list[dict[str, Any]], out: Path) -> dict[str, Path]:
-    """The same figures as SVG and PDF, for papers, in the subfolder `print`."""
-    return {
+def write_drawn(drawn: list[dict[str, Any]], out: Path) -> dict[str, Path]:
+    """Figures as PNG, for papers as SVG and PDF in the subfolder `print`: paths by name, and by name and format."""
+    return {f["name"]: write_bytes(out / f"{f['name']}.png", f["png"]) for f in drawn} | {
         f"{f['name']}.{kind}": write_figure(out / "print" / f"{f['name']}.{kind}", f["figure"])
         for f in drawn
         for kind in VECTOR
@@ -78,7 +78,7 @@ def write_fit(found: Fit, out: Path, pictures: bool = True) -> dict[str, Path]:
     if not pictures:
         return written
     drawn = figures(found)
-    written |= {f["name"]: write_bytes(out / f"{f['name']}.png", f["png"]) for f in drawn}
+    written |= write_drawn(drawn, out)
     page = render(
         "fit.html.j2",
         title=f"Fit of {found.problem.predictor.sample.name}",
@@ -96,9 +96,9 @@ def write_fit(found: Fit, out: Path, pictures: bool = True) -> dict[str, Path]:
     written["page"] = write_text(out / "report.html", page)
     written["curves"] = write_curves(found, out / "curves.csv")
     written["table"] = write_latex(found, out / "parameters.tex")
-    return written | printable(drawn, out)
+    return written
 
 
 def write_figures(subject: Any, out: Path) -> Mapping[str, Path]:
-    """One PNG a figure of any subject that has plots."""
-    return {f["name"]: write_bytes(out / f"{f['name']}.png", f["png"]) for f in figures(subject)}
+    """PNG, SVG and PDF of every figure of any subject that has plots."""
+    return write_drawn(figures(subject), out)

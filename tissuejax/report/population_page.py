@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from tissuejax.campaign.population import Population
-from tissuejax.report.page import figures, render
+from tissuejax.report.page import figures, render, write_drawn
 from tissuejax.report.population import intervals, shown_in
 from tissuejax.report.scales import ratios
-from tissuejax.storage import write_bytes, write_json, write_text
+from tissuejax.storage import write_json, write_text
 
 
 def write_population(found: Population, out: Path) -> dict[str, Path]:
@@ -22,7 +22,7 @@ def write_population(found: Population, out: Path) -> dict[str, Path]:
     return {
         "numbers": write_json(out / "population.json", record),
         "specimens": write_text(out / "specimens.csv", _table(found, rows)),
-        **{f["name"]: write_bytes(out / f"{f['name']}.png", f["png"]) for f in drawn},
+        **write_drawn(drawn, out),
         "page": write_text(out / "report.html", page),
     }
 

@@ -1,6 +1,7 @@
 """Draws of a posterior: a histogram for each parameter, and every pair against each other."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -8,8 +9,10 @@ from matplotlib.figure import Figure
 
 from tissuejax.fitting.posterior import Posterior
 from tissuejax.fitting.result import Fit
-from tissuejax.report.plot import HELD, INK, MODEL, PAPER, Plot, tidy
-from tissuejax.report.scales import display, label
+from tissuejax.report.fit_tables import PARAMETERS
+from tissuejax.report.numbers import write_tabular
+from tissuejax.report.plot import HELD, INK, MODEL, PAPER, Plot, legend_below, tidy
+from tissuejax.report.scales import display, label, with_std
 
 MOST_PAIRED = 6  # parameters; more panels can't be read
 SHOWN = 800  # points
@@ -21,6 +24,17 @@ class Drawn:
 
     fit: Fit
     posterior: Posterior
+
+
+def write_latex(subject: Drawn, path: Path) -> Path:
+    r"""A `tabular` of mean, standard deviation and 95 % interval of each parameter."""
+    declared, rows = subject.fit.problem.predictor.model.parameters, []
+    for name, row in subject.posterior.record()["parameters"].items():
+        by, unit = display(declared[name].unit, abs(row["mean"]))
+        low, high = row["95 %"]
+        value = with_std(row["mean"] / by, row["std"] / by)
+        rows.append((name, value, f"{low / by:.4g} to {high / by:.4g}", "" if unit == "1" else unit))
+    return write_tabular(path, PARAMETERS, rows)
 
 
 class PosteriorPairs(Plot):
@@ -60,10 +74,11 @@ class PosteriorPairs(Plot):
                     continue
                 tidy(ax)
                 if i == j:
-                    ax.hist(x, 40, density=True, color=MODEL, alpha=0.75)
+                    ax.hist(x, 40, density=True, color=MODEL, alpha=0.75, label="draws")
                     if np.isfinite(std) and std > 0:
                         t = np.linspace(x.min(), x.max(), 120)
-                        ax.plot(t, np.exp(-0.5 * ((t - value) / std) ** 2) / std / np.sqrt(2 * np.pi), color=HELD)
+                        normal = np.exp(-0.5 * ((t - value) / std) ** 2) / std / np.sqrt(2 * np.pi)
+                        ax.plot(t, normal, color=HELD, label="estimate and standard error")
                     ax.set_yticks([])
                     ax.set_title(name, fontsize=9, color=INK)
                 else:
@@ -73,4 +88,5 @@ class PosteriorPairs(Plot):
                     ax.set_xlabel(data[j][0])
                 if j == 0 and i > 0:
                     ax.set_ylabel(name)
+        legend_below(figure, [axes[i, i] for i in range(p)], columns=2 if p > 1 else 1)
         return figure

@@ -1,6 +1,7 @@
 """Profile likelihoods: how chi-square rises as each parameter is held away from its estimate."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -8,8 +9,21 @@ from matplotlib.figure import Figure
 
 from tissuejax.fitting.profile import Profile
 from tissuejax.fitting.result import Fit
+from tissuejax.report.numbers import headed, write_series
 from tissuejax.report.plot import FAINT, HELD, INK, MODEL, Plot, grid
 from tissuejax.report.scales import display, label
+
+
+def write_profiles(subject: "Profiles", path: Path) -> Path:
+    """The figure's points as CSV: where each parameter was held, SI, and how much chi-square rises."""
+    declared = subject.fit.problem.predictor.model.parameters
+    return write_series(
+        path,
+        (
+            ({"parameter": p.path}, {headed("held at", declared[p.path].unit): p.values, "rise of chi-square": p.rise})
+            for p in subject.profiles
+        ),
+    )
 
 
 @dataclass(frozen=True)
