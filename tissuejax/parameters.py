@@ -80,8 +80,3 @@ def checked(values: Mapping[str, float], declared: Mapping[str, Parameter]) -> d
             unit = "" if p.unit == "1" else f" {p.unit}"
             raise InputError(f"{path} = {value}{unit}: allowed is {p.lower} to {p.upper}{unit}; change the value")
     return dict(values)
-
-
-def begun(text: str) -> str:
-    """A sentence with its first letter large, unless it begins with a parameter's path."""
-    return text if "." in text.split(" ", 1)[0] else text[0].upper() + text[1:]

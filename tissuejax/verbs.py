@@ -128,7 +128,8 @@ def fit(
         found = kind.fit(posed, held, search, frozenset(start or ()), progress)
     except UnstableSimulation as error:
         raise UnstableSimulation(f"{error}{'. First look at the data: ' if said else ''}{'; '.join(said)}") from error
-    found.warnings.extend(f"Look at the data: {sentence}." for sentence in said)
+    for sentence in said:
+        found.warnings.append(f"Look at the data: {sentence}" + ("" if sentence.endswith("?") else "."))
     return found if begun is None else replace(found, first=begun)
 
 

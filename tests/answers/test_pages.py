@@ -11,6 +11,7 @@ import tissuejax as tj
 from tests.specimens import ramp, recording
 from tissuejax.fitting.advice import beyond_noise, suspect
 from tissuejax.fitting.bands import fitted_std, prediction_std
+from tissuejax.fitting.probed import numerical_sentence
 from tissuejax.recordings.recording import Channel, Recording, Sample
 from tissuejax.report import sentences
 from tissuejax.report.fit_overlay import FitOverlay
@@ -130,6 +131,18 @@ def test_curves_and_table_are_written(found, tmp_path):
     assert "energy.mu & " in latex
 
 
+def test_a_question_ends_in_one_mark():
+    wide = sample(10.0).recordings["pull"]
+    stretch = np.linspace(1.0, 7.0, 60)
+    made = recording("pull", "uniaxial", np.arange(60.0), stretch)
+    channel = Channel(
+        np.arange(60.0), 3000.0 * (stretch - stretch**-2), "Pa", wide.channels["nominal_stress"].noise_std
+    )
+    pull = Recording("pull", "uniaxial", made.inputs, {"nominal_stress": channel}, {})
+    (said,) = [w for w in tj.fit(Sample("s", {"pull": pull}), "neo-hookean", search=ONCE).warnings if "Look at" in w]
+    assert said.endswith("is the height wrong?")
+
+
 def test_effects_off_is_the_energy_alone():
     time = np.linspace(0, 30, 60)
     stretch = 1 + 0.3 * ramp(time, (0, 0), (2, 1), (30, 1))
@@ -140,3 +153,13 @@ def test_effects_off_is_the_energy_alone():
     found = tj.fit(data, "neo-hookean", effects=["viscoelasticity"], search=ONCE)
     bare = FitOverlay().prepare(found)[0].bare
     np.testing.assert_allclose(bare, found.values["energy.mu"] * (stretch - stretch**-2), rtol=1e-9, atol=1e-9)
+
+
+def test_numerical_errors_are_told_as_shares_of_the_values():
+    declared = {p: SimpleNamespace(typical=1000.0) for p in ("energy.mu", "volumetric.K")}
+    problem = SimpleNamespace(
+        free=tuple(declared), predictor=SimpleNamespace(model=SimpleNamespace(parameters=declared))
+    )
+    values, shifts = {"energy.mu": 1250.0, "volumetric.K": 8000.0}, {"mesh": {"energy.mu": 25.0, "volumetric.K": 800.0}}
+    told = numerical_sentence(problem, values, shifts, SimpleNamespace(std=np.array([12.5, 2400.0])))
+    assert told.endswith("of the values: mu 2 % (noise 1 %), K 10 % (noise 30 %).")

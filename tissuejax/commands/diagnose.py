@@ -22,6 +22,7 @@ from tissuejax.report import diagnosis_sentences as sentences
 from tissuejax.report import judged_sentences as judged
 from tissuejax.report.diagnosis_page import write_diagnosis
 from tissuejax.report.headline import headline
+from tissuejax.report.scales import with_unit
 
 
 class DiagnoseCommand(Command):
@@ -46,9 +47,9 @@ shown come from a fit to the others, with nothing fitted to those held out.
   tissuejax diagnose rubber.toml --energy ogden-3 --ogden-form mu/alpha --effect viscoelasticity --effect softening
 
 What is written into --out: result.json (every number), report.html (one page to read and keep), remainder.json (what is
-still left, as smooth functions of drive, rate, time and place), evidence.json (every set weighed), the figures (PNG; SVG
-and PDF in print/), curves.csv (the first figure in numbers, SI) and parameters.tex. Probings take minutes; one that was stopped goes on where it was when the same command is given again. Material
-tests and cuts begin anew.
+still left, as smooth functions of drive, rate, time and place), evidence.json (every set weighed), the figures (PNG;
+SVG and PDF in print/), curves.csv (the first figure in numbers, SI) and parameters.tex. Probings take minutes; one that
+was stopped goes on where it was when the same command is given again. Material tests and cuts begin anew.
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
@@ -132,14 +133,16 @@ def diagnosed(found: Diagnosis, written: dict[str, Path]) -> Reply:
     """The verdict as text and as the record of `--json`."""
     lines = [headline(found), "", f"Verdict: {found.verdict.kind}. {judged.lead(found)}", ""]
     lines += [
-        f"  {r['path']:<40}{r['value']:>24} {r['unit']:<6}{r['note'] or r['interval']}".rstrip()
+        f"  {r['path']:<40}{with_unit(r['value'], r['unit']):>31}  {r['note'] or r['interval']}".rstrip()
         for r in sentences.parameters(found)
     ]
     if found.verdict.chosen:
         lines += ["", f"{found.energy}, alone and with what was missing:"]
         rows = sentences.base(found)
         wide = max(24, *(len(r["path"]) + 2 for r in rows))
-        lines += [f"  {r['path']:<{wide}}{r['before']:>16}{r['after']:>24} {r['unit']}".rstrip() for r in rows]
+        lines += [
+            f"  {r['path']:<{wide}}{r['before']:>16}{with_unit(r['after'], r['unit']):>31}".rstrip() for r in rows
+        ]
     lines += ["", *judged.sure(found), *(f"  ! {w}" for w in found.as_dict()["warnings"]), ""]
     lines += [f"page     {written['page']}", f"numbers  {written['result']}"]
     record = found.as_dict() | {

@@ -19,6 +19,7 @@ from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read, read_all
 from tissuejax.report import sentences
 from tissuejax.report.page import write_fit
+from tissuejax.report.scales import with_unit
 from tissuejax.storage import write_text
 
 
@@ -139,7 +140,7 @@ def reply(found: Fit, written: dict[str, Path]) -> Reply:
     lines = [sentences.summary(found), ""]
     lines += [f"DON'T USE THESE NUMBERS AS THEY ARE: {'; '.join(doubts)}.", ""] if doubts else []
     lines += [
-        f"  {row['path']:<34} {row['value']:>26} {row['unit']:<6}{row['note'] or row['interval']}"
+        f"  {row['path']:<34} {with_unit(row['value'], row['unit']):>33}  {row['note'] or row['interval']}"
         for row in sentences.table(found)
     ]
     if found.shear_moduli:

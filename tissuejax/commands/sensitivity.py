@@ -18,7 +18,7 @@ from tissuejax.experiments.predictor import predictor
 from tissuejax.fitting.sensitivity import local
 from tissuejax.fitting.sobol import sobol
 from tissuejax.model import Model
-from tissuejax.parameters import begun, checked
+from tissuejax.parameters import checked
 from tissuejax.recordings.files import read
 from tissuejax.recordings.recording import Channel, Recording, Sample
 from tissuejax.report.page import write_figures
@@ -105,7 +105,7 @@ def text_of(record: dict) -> str:
     """Directions, what is not seen, Sobol indices."""
     lines = ["What the data see, sharpest first:"]
     lines += [f"  {i}. {d['sentence']}" for i, d in enumerate(record["local"]["directions"], start=1)]
-    lines += [f"  ! {begun(sentence)}" for sentence in record["local"]["not_identified"]]
+    lines += [f"  ! {sentence}" for sentence in record["local"]["not_identified"]]
     for key, total in record.get("sobol", {}).get("total", {}).items():
         first = record["sobol"]["first"][key]
         shares = sorted(total, key=total.get, reverse=True)

@@ -182,10 +182,10 @@ def unseen(
     if len(who) == 2:
         i, j = sorted(who)
         return (
-            f"only {seen_pair(direction, size, labels, units, i, j)} is seen: a change of one against the other {how}."
+            f"Only {seen_pair(direction, size, labels, units, i, j)} is seen: a change of one against the other {how}."
         )
     moves = ", ".join(f"{labels[i]} by {100 * direction[i] / np.abs(direction).max():+.0f} %" for i in sorted(who))
-    return f"one combination is not identified: a change of {moves} together {how}."
+    return f"One combination is not identified: a change of {moves} together {how}."
 
 
 def seen_pair(direction, size, labels, units, i: int, j: int) -> str:

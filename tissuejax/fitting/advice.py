@@ -8,7 +8,6 @@ import numpy as np
 from tissuejax.estimation.level import NEGLIGIBLE
 from tissuejax.estimation.stability import sentence
 from tissuejax.fitting.memory import begun_loaded, times
-from tissuejax.parameters import begun
 
 if TYPE_CHECKING:
     from tissuejax.fitting.result import Fit
@@ -37,7 +36,7 @@ def warnings_of(found: "Fit") -> list[str]:
         unit = problem.predictor.model.parameters[path].unit
         shown = f"{limit:g}{'' if unit == '1' else f' {unit}'}"
         said.append(f"{path} ended at its {side} bound ({shown}); its standard error means little there.")
-    said += [begun(text) for text in found.uncertainty.sentences]
+    said += found.uncertainty.sentences
     said += _twins(found)
     said += [text] if (text := sentence(found.stability)) else []
     if times(problem.predictor):

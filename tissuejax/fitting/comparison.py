@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from tissuejax.errors import InputError
-from tissuejax.parameters import begun
 
 if TYPE_CHECKING:
     from tissuejax.fitting.result import Fit
@@ -173,7 +172,7 @@ def _row(name: str, record: Mapping) -> dict:
         "status": record["status"],
         "warnings": tuple(
             [f"{path} at its {p['at_bound']} bound" for path, p in record["parameters"].items() if p["at_bound"]]
-            + [begun(s) for s in record["not_identified"]]
+            + list(record["not_identified"])
         ),
     }
 

@@ -167,8 +167,7 @@ def fit_probed(
     )
     found.warnings.extend(warnings_of(found))
     if shifts:
-        units = {p: d.unit for p, d in problem.predictor.model.parameters.items()}
-        found.warnings.append(_numerical_sentence(problem.free, shifts, noise_part, units))
+        found.warnings.append(numerical_sentence(problem, values, shifts, noise_part))
     kept.done()
     noise_std = dict(zip(problem.free, map(float, noise_part.std), strict=True))
     return ProbedFit(found, shifts, sizes, noise_std, {"forward": runs.simulated.runs, "jacobian": runs.jacobians})
@@ -271,10 +270,13 @@ def _with_shifts(noise: Uncertainty, shifts: list[Float[np.ndarray, " p"]]) -> U
     return replace(noise, std=std, covariance=covariance, correlation=correlation)
 
 
-def _numerical_sentence(free, shifts, noise: Uncertainty, units: Mapping[str, str]) -> str:
-    parts = []
-    for i, path in enumerate(free):
+def numerical_sentence(problem: Problem, values: Mapping[str, float], shifts, noise: Uncertainty) -> str:
+    """Shares of the values, so that the sentence is right beside any unit."""
+    declared, parts = problem.predictor.model.parameters, []
+    for i, path in enumerate(problem.free):
+        size = abs(values[path]) or declared[path].typical
         total = sum(s[path] ** 2 for s in shifts.values()) ** 0.5
-        unit = "" if units[path] == "1" else f" {units[path]}"
-        parts.append(f"{path.split('.')[-1]} {total:.3g}{unit} (noise {noise.std[i]:.3g}{unit})")
-    return f"Standard errors include what mesh, step and penalty leave open: {', '.join(parts)}."
+        shares = (f"{100 * part / size:.2g} %" for part in (total, noise.std[i]))
+        parts.append("{} {} (noise {})".format(path.split(".")[-1], *shares))
+    told = ", ".join(parts)
+    return f"Standard errors include what mesh, step and penalty leave open, of the values: {told}."

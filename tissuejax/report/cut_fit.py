@@ -13,10 +13,10 @@ from tissuejax.report.scales import display
 CHANNEL = "cutting_force"
 NORMAL_95 = 1.96  # standard deviations of the noise in which 95 % of the samples are
 CALLED = {
-    STRENGTH: "strength of the faces",
-    ENERGY: "toughness",
-    FRICTION: "friction of the blade",
-    ONSET: "length over which the force sets in, beyond 2 mm",
+    STRENGTH: "Strength of the faces",
+    ENERGY: "Toughness",
+    FRICTION: "Friction of the blade",
+    ONSET: "Length over which the force sets in, beyond 2 mm",
 }
 
 
@@ -25,7 +25,7 @@ def sentences(found: CutFit) -> list[str]:
     said = [_told(found)]
     if found.status != "converged":
         said.append(f"The fit did not converge ({found.status}); the numbers are where it stopped.")
-    said += [f"{CALLED.get(p, p).capitalize()}: not identified: {why}." for p, why in found.unidentified.items()]
+    said += [f"{CALLED.get(p, p)}: not identified: {why}." for p, why in found.unidentified.items()]
     return said + [f"Take care: {w}." for w in found.warnings]
 
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"))
+UNKNOWN = " (not identified)"
 SCALED = {"Pa", "N", "m", "s"}
 SMALL = 0.3  # spread of a logarithm up to which it is nearly the relative spread
 
@@ -44,7 +45,7 @@ def with_std(value: float, std: float | None) -> str:
     if std is None:
         return f"{value:.5g}"
     if not math.isfinite(std):
-        return f"{value:.4g} (not identified)"
+        return f"{value:.4g}{UNKNOWN}"
     if std <= 0 or std < 1e-9 * abs(value):
         return f"{value:.6g} ± 0"
     own = 3 - math.floor(math.log10(abs(value))) if value else 0
@@ -54,6 +55,12 @@ def with_std(value: float, std: float | None) -> str:
     places = max(0, theirs, own if abs(value) > std else min(own, 4))
     error = f"{std:.{places}f}" if places <= max(0, theirs) else f"{std:.{max(0, theirs)}f}"
     return f"{value:.{places}f} ± {error}"
+
+
+def with_unit(value: str, unit: str) -> str:
+    """What `with_std` says, with its unit: 72 s (not identified), 1.2 ± 0.1 kPa; aligned where there is none."""
+    number, words = (value.removesuffix(UNKNOWN), UNKNOWN) if value.endswith(UNKNOWN) else (value, "")
+    return f"{number} {unit}".strip() + words
 
 
 def label(unit: str) -> str:
