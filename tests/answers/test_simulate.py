@@ -10,8 +10,10 @@ import pytest
 from tests.probing import bench
 from tissuejax.cli import main
 from tissuejax.errors import InputError
+from tissuejax.experiments.probing_points import write_points
 from tissuejax.experiments.virtual import corners
 from tissuejax.recordings.files import read, write
+from tissuejax.recordings.recording import Channel, Recording
 
 
 def rows(path):
@@ -35,6 +37,8 @@ def test_a_simulated_tension_test_is_the_textbook_one_and_can_be_fitted(tmp_path
     told = rows(tmp_path / "uniaxial-nominal_stress.csv")
     l = np.array([r["stretch (1)"] for r in told])
     np.testing.assert_allclose([r["nominal_stress (Pa)"] for r in told], 3000 * (l - l**-2), rtol=1e-6, atol=1e-4)
+    assert {p.name for p in (tmp_path / "print").iterdir()} == {"simulated.svg", "simulated.pdf"}
+    assert (tmp_path / "simulated.png").stat().st_size > 10000
     noisy = tmp_path / "noisy"
     again = ["-e", "neo-hookean", "--set", "energy.mu=3 kPa", *path, "--noise", "15 Pa", "-o", str(noisy), "--json"]
     assert main(["simulate", *again]) == 0
@@ -69,6 +73,26 @@ def test_what_cannot_be_simulated_is_refused(tmp_path, capsys):
     assert "positive" in capsys.readouterr().err
 
 
+def test_tip_and_markers_stand_beside_the_states(tmp_path):
+    meshio = pytest.importorskip("meshio")
+    time = np.array([0.0, 1.0])
+    inputs = {"probe/time": time, "probe/position": np.array([[0.0, 0.0, 0.03], [0.0, 0.0, 0.02]])}
+    places = np.array([[[0.01, 0.0, 0.0], [0.0, 0.01, 0.0]]] * 2)
+    moved = places + np.array([[[0.0] * 3] * 2, [[1e-4, 0.0, 0.0], [np.nan] * 3]])
+    one, two = (
+        Recording("r", "probing", inputs, {"markers": Channel(time, x, "m", 1e-5)}, {"probe/radius": 8e-3})
+        for x in (places, moved)
+    )
+    mesh = meshio.read(write_points(one, 0.9, tmp_path / "p.vtu", two))
+    np.testing.assert_allclose(mesh.points, [[0, 0, 0.021], *places[1]], atol=1e-12)
+    assert mesh.point_data["radius"].tolist() == [8e-3, 0, 0]
+    assert mesh.point_data["kind"].tolist() == [0, 1, 1]
+    assert mesh.point_data["seen"].tolist() == [0, 1, 0]
+    np.testing.assert_allclose(mesh.point_data["residual"], [[0] * 3, [1e-4, 0, 0], [0] * 3], atol=1e-15)
+    bare = Recording("r", "probing", inputs, {}, {"probe/radius": 8e-3})
+    assert len(meshio.read(write_points(bare, 0.0, tmp_path / "q.vtu")).points) == 1
+
+
 @pytest.mark.slow
 def test_states_of_a_probing_can_be_opened_and_pictured(tmp_path, capsys):
     meshio = pytest.importorskip("meshio")
@@ -80,6 +104,8 @@ def test_states_of_a_probing_can_be_opened_and_pictured(tmp_path, capsys):
     how = ["--states", "--compression", "10", "-o", str(tmp_path / "out"), "--json"]
     assert main(["simulate", "-e", "neo-hookean", "--set", "energy.mu=1 kPa", *what, *how]) == 0
     files = json.loads(capsys.readouterr().out)["files"]
-    deepest = min(meshio.read(p).point_data["displacement"][:, 2].min() for p in (tmp_path / "out").glob("*.vtu"))
+    bodies = [meshio.read(p) for p in (tmp_path / "out").glob("probing.[0-9]*.vtu")]
+    deepest = min(body.point_data["displacement"][:, 2].min() for body in bodies)
     assert deepest == pytest.approx(-3e-3, rel=0.05)  # between points of contact a node lies a little deeper
+    assert len(list((tmp_path / "out").glob("probing.points.*.vtu"))) == len(bodies)
     assert ("probing picture" in files) == (find_spec("pyvista") is not None)

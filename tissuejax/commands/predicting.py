@@ -19,8 +19,8 @@ class Predict(Command):
     summary: ClassVar[str] = "what a fitted model says of recordings, beside what was measured"
     teaches: ClassVar[str] = """
 Predict the recordings of a file with a fitted model: nothing is fitted. Writes a recording file with the predictions,
-CSV tables with prediction and measurement side by side, and for probings with --states the deformed states, a picture
-and an animation with the residuals of the markers.
+CSV tables with prediction and measurement side by side, a figure, and for probings with --states the deformed states, a
+picture and an animation with the residuals of the markers.
 
   tissuejax predict out/liver/result.json liver.h5
   tissuejax predict out/rubber/result.json other-day.h5 --only planar

@@ -37,7 +37,8 @@ class Simulate(Command):
     order: ClassVar[int] = 37
     summary: ClassVar[str] = "a recording that a model would give, for a rig or probe path; states for ParaView"
     teaches: ClassVar[str] = """
-What a material would show in a test: a recording file (HDF5), CSV tables, and for probings the deformed states.
+What a material would show in a test: a recording file (HDF5), CSV tables, a figure (PNG; SVG and PDF in print/), and
+for probings the deformed states.
 
   tissuejax simulate --published in-vivo-1 --mode uniaxial --path "0:1 10:1.3 40:1.3 50:1"
   tissuejax simulate out/liver/result.json --mode planar --path path.csv --noise "20 Pa"
@@ -48,9 +49,9 @@ What a material would show in a test: a recording file (HDF5), CSV tables, and f
 --path is corners TIME:VALUE in seconds and stretch (or shear; biaxial: TIME:A,B), or a CSV with a line of names and
 columns time and stretch (two for biaxial). --body FILE gives the body of a probing; its path is a CSV of time, x, y, z
 of the tip's centre in the body's frame, or the name of a recording of that file, whose path and tip are taken. Units
-may stand in the names ("x (mm)"); without, it is s and m. With --states: HDF5, XDMF and VTU series for ParaView, and,
-where pyvista is installed, a picture and an animation. Without --noise nothing is added; the noise level in the file is
-then a placeholder, 1e-6 of the peak.
+may stand in the names ("x (mm)"); without, it is s and m. With --states: HDF5, XDMF and VTU series for ParaView (the
+body, and as points the tip and the markers with their residuals), and, where pyvista is installed, a picture and an
+animation. Without --noise nothing is added; the noise level in the file is then a placeholder, 1e-6 of the peak.
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
@@ -112,7 +113,7 @@ def _probing(body: Sample, given: argparse.Namespace) -> Recording:
 def add_output(parser: argparse.ArgumentParser) -> None:
     """--states, --no-pictures, --compression, --out."""
     parser.add_argument("--states", action="store_true", help="of a probing: the deformed states too")
-    parser.add_argument("--no-pictures", action="store_true", help="no picture or animation of the states")
+    parser.add_argument("--no-pictures", action="store_true", help="no figure, nor picture or animation of the states")
     parser.add_argument("--compression", type=float, metavar="F", help="of a probing: run F times faster than life")
     parser.add_argument("--mesh", choices=["graded", "file"], help="of a probing: the file's mesh or a graded one")
     add_out(parser, "out/NAME-simulated or out/NAME-predicted")
@@ -152,6 +153,7 @@ def simulated(
     if missing:
         own = ", ".join(missing)
         notes.append(f"{own}: a value of its own for each recording, not known here; taken as neutral")
+    files |= _figure(predicted, sample, measured, out) if not given.no_pictures else {}
     if given.states and not probings:
         raise InputError("--states is for probings: a material test has one state of strain everywhere")
     for name in probings if given.states else ():
@@ -171,11 +173,18 @@ def simulated(
     return Reply(record, "\n".join(lines))
 
 
+def _figure(predicted: Mapping[str, Recording], sample: Sample, measured: bool, out: Path) -> dict[str, Path]:
+    from tissuejax.report.page import write_figures  # it brings every plot along
+    from tissuejax.report.simulated import Simulated
+
+    return dict(write_figures(Simulated(predicted, sample.recordings if measured else None, sample.timed), out))
+
+
 def _states(made, values, name, out, predicted: Recording, measured, given, notes) -> dict[str, Path]:
     from tissuejax.experiments.probing_states import keep_states
     from tissuejax.report.scene_pictures import film, write_pictures
 
-    found = keep_states(made, values, name, out, for_terminal())
+    found = keep_states(made, values, name, out, for_terminal(), predicted=predicted, measured=measured)
     if not given.no_pictures:
         try:
             found |= write_pictures(film(found["states"], predicted, measured), out)

@@ -7,8 +7,10 @@ import numpy as np
 
 from tissuejax.experiments.homogeneous import local
 from tissuejax.experiments.probing import assembled
+from tissuejax.experiments.probing_points import write_points
 from tissuejax.experiments.probing_predictor import ProbingPredictor
 from tissuejax.progress import Progress
+from tissuejax.recordings.recording import Recording
 from tissuejax.tled.stream import run_to_file, to_vtu, to_xdmf
 
 STATES = 24  # kept of a run
@@ -21,8 +23,12 @@ def keep_states(
     folder: Path,
     progress: Progress,
     states: int = STATES,
+    predicted: Recording | None = None,
+    measured: Recording | None = None,
 ) -> dict[str, Path]:
     """Simulate recording `name` and write its states: HDF5, an XDMF series over it, and VTU files with their PVD list.
+
+    With `predicted` (and `measured`) each state has a second VTU file: the tip and the markers (`probing_points`).
 
     Returns:
         Paths: "states", "xdmf", "pvd".
@@ -45,8 +51,14 @@ def keep_states(
         times = np.asarray(file["states/time"])
     pieces = [to_vtu(run, folder / f"{name}.{k:03d}.vtu", k) for k in range(len(times))]
     pvd = folder / f"{name}.pvd"
+    parts = [pieces]
+    if predicted is not None:
+        marks = (folder / f"{name}.points.{k:03d}.vtu" for k in range(len(times)))
+        parts.append([write_points(predicted, t, p, measured) for t, p in zip(times, marks, strict=True)])
     sets = "".join(
-        f'<DataSet timestep="{t:.9g}" part="0" file="{p.name}"/>' for t, p in zip(times, pieces, strict=True)
+        f'<DataSet timestep="{t:.9g}" part="{k}" file="{p.name}"/>'
+        for k, files in enumerate(parts)
+        for t, p in zip(times, files, strict=True)
     )
     pvd.write_text(
         f'<?xml version="1.0"?><VTKFile type="Collection" version="0.1"><Collection>{sets}</Collection></VTKFile>'

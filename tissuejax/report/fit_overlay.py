@@ -75,14 +75,15 @@ class FitOverlay(Plot):
         return figure
 
 
-def draw_shown(ax, shown: Shown, by_time: bool) -> None:
-    """One series on one axis, with band and bare model."""
+def draw_shown(ax, shown: Shown, by_time: bool, measured: bool = True) -> None:
+    """One series on one axis, with band and bare model; `measured` is False where there is nothing but the model."""
     curve = shown.curve
     factor, unit = display(curve.unit, float(np.nanmax(np.abs(curve.measured), initial=0.0)))
     x, across = curve.axis(by_time)
     colour, kind = (HELD, "model, held out") if curve.held else (MODEL, "model")
     thin = slice(None, None, max(1, len(x) // DENSE_OVERLAY))
-    scatter(ax, x[thin], curve.measured[thin] / factor)
+    if measured:
+        scatter(ax, x[thin], curve.measured[thin] / factor)
     if shown.bare is not None:
         ax.plot(x, shown.bare / factor, "--", color=BASE, linewidth=1.1, zorder=3, label="effects off")
     if shown.band is not None:

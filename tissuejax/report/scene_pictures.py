@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.errors import InputError
+from tissuejax.experiments.probing_points import markers_at, tip_at
 from tissuejax.recordings.recording import Recording
 from tissuejax.storage import replacing
 
@@ -60,22 +61,18 @@ def film(states: Path, predicted: Recording, measured: Recording | None = None) 
         points, cells, kind = file["points"][...], file["cells"][...], str(file.attrs["cell_type"])
         times = file["states/time"][...]
         moved = [file[f"states/displacement/{k}"][...] for k in range(len(times))]
-    path_time, path = np.asarray(predicted.inputs["probe/time"]), np.asarray(predicted.inputs["probe/position"])
 
     def markers(recording: Recording | None, t: float):
-        channel = None if recording is None else recording.channels.get("markers")
-        if channel is None:
-            return None
-        k = int(np.argmin(np.abs(np.asarray(channel.time) - t)))
-        return MM * np.asarray(channel.values, float)[k]
+        found = markers_at(recording, t)
+        return None if found is None else MM * found
 
-    inside = [k for k, t in enumerate(times) if t <= path_time[-1] + 1e-9] or [0]
+    inside = [k for k, t in enumerate(times) if t <= predicted.inputs["probe/time"][-1] + 1e-9] or [0]
     frames = tuple(
         Frame(
             float(times[k]),
             MM * (points + moved[k]),
             MM * np.linalg.norm(moved[k], axis=1),
-            MM * np.array([np.interp(times[k], path_time, column) for column in path.T]),
+            MM * tip_at(predicted, times[k]),
             markers(predicted, times[k]),
             markers(measured, times[k]),
         )
@@ -128,7 +125,7 @@ def _draw(pyvista, plotter, subject: Film, frame: Frame, most: float) -> None:
     cells = np.hstack([np.full((len(subject.cells), 1), subject.cells.shape[1]), subject.cells]).ravel()
     grid = pyvista.UnstructuredGrid(cells, np.full(len(subject.cells), VTK[subject.cell_type]), frame.points)
     grid.point_data["displacement (mm)"] = frame.moved
-    bar = {"title": "displacement (mm)\n", "color": "#22313f", "n_labels": 4, "fmt": "%.2f", "vertical": True}
+    bar = {"title": "displacement\n(mm)\n", "color": "#22313f", "n_labels": 4, "fmt": "%.2f", "vertical": True}
     bar |= {"position_x": 0.88, "position_y": 0.08, "width": 0.07, "height": 0.5, "title_font_size": 14}
     bar["label_font_size"] = 14
     plotter.set_background("white")
