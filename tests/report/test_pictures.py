@@ -9,10 +9,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from mpl_toolkits.mplot3d import proj3d
 
 import tissuejax as tj
+from tissuejax.commands.inspecting import described, text_of
 from tissuejax.experiments.probing_shape import Deformed
 from tissuejax.fitting.bands import marker_std
-from tissuejax.recordings.recording import Channel, Recording
+from tissuejax.recordings.recording import Channel, Recording, Sample
 from tissuejax.report.fit_overlay import FitOverlay
+from tissuejax.report.overview import Overview
 from tissuejax.report.plot import band, grid
 from tissuejax.report.probed_shape import ProbedShape
 from tissuejax.report.series import curves_of
@@ -64,6 +66,24 @@ def test_a_probing_is_shown_over_depth():
     assert deep.axis(by_time=False)[1] == "depth (mm)"
     np.testing.assert_allclose(deep.axis(by_time=False)[0], [-3, 2, -3], atol=1e-12)
     assert deep.axis(by_time=True)[1] == "time (s)"
+
+
+def test_a_look_at_a_probing_names_its_axes_and_its_markers():
+    time, z = np.arange(7.0), 1e-3 * np.array([24, 24, 24, 24, 24, 22, 20])
+    inputs = {"probe/time": time, "probe/position": np.stack([2e-3 + 0 * z, 1e-3 * time, z], 1)}
+    out = np.maximum(time - 4, 0)[:, None, None] * np.array([[1e-4, 0, 0], [0, 0, -3e-4], [0, 2e-4, 0]])
+    press = Recording("press", "probing", inputs, {"markers": Channel(time, out + 0.01, "m", 1e-5)}, {})
+    sample = Sample("s", {"press": press})
+    said = "\n".join(text_of(described(sample)))
+    assert "x 2 to 2, y 0 to 6, z 20 to 24 mm; 4 mm down" in said
+    median, largest = Overview().prepare(sample)[0]
+    assert median.channel.endswith("median")
+    assert largest.channel.endswith("largest (marker 2)")
+    np.testing.assert_allclose(median.measured[-2:], [2e-4, 4e-4])
+    np.testing.assert_allclose(largest.measured[-2:], [3e-4, 6e-4])
+    figure = Overview().draw(Overview().prepare(sample))
+    shown = [ax.get_xlabel() for ax in figure.axes if ax.get_visible()]
+    assert shown == ["travel of the probe downwards (mm)", "time (s)"] * 2
 
 
 def test_the_band_of_the_markers_is_that_of_their_mean_way():

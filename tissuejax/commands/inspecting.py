@@ -105,6 +105,13 @@ def _recording(recording: Recording) -> dict:
         for name, v in ((n, np.asarray(v, float)) for n, v in recording.inputs.items())
         if v.size
     }
+    for name in [n for n in inputs if np.shape(recording.inputs[n])[1:] == (3,)]:
+        columns = np.asarray(recording.inputs[name], float).T
+        inputs[name]["axes"] = {
+            a: [float(np.nanmin(v)), float(np.nanmax(v))] for a, v in zip("xyz", columns, strict=True)
+        }
+        if name == "probe/position":
+            inputs[name]["down"] = float(columns[2, 0] - np.nanmin(columns[2]))
     channels = {}
     for name, channel in recording.channels.items():
         values, time = np.asarray(channel.values, float), np.asarray(channel.time, float)
@@ -141,7 +148,9 @@ def text_of(record: dict) -> list[str]:
             if "time" not in key:
                 factor, unit = display(i["unit"], max(abs(i["min"]), abs(i["max"])))
                 unit = "" if unit == "1" else f" {unit}"
-                span = f"{i['min'] / factor:.4g} to {i['max'] / factor:.4g}{unit}"
+                ends = {"": (i["min"], i["max"])} if "axes" not in i else {f"{a} ": e for a, e in i["axes"].items()}
+                span = ", ".join(f"{a}{low / factor:.4g} to {high / factor:.4g}" for a, (low, high) in ends.items())
+                span += unit + (f"; {i['down'] / factor:.4g}{unit} down" if "down" in i else "")
                 lines.append(f"    did       {key:<18} {span}, {i['n']} samples")
         for key, c in r["channels"].items():
             factor, unit = display(c["unit"], max(abs(c["min"] or 0), abs(c["max"] or 0)))
