@@ -13,7 +13,7 @@ from tissuejax.commands.inspecting import described, text_of
 from tissuejax.experiments.probing_shape import Deformed
 from tissuejax.fitting.bands import marker_std
 from tissuejax.recordings.recording import Channel, Recording, Sample
-from tissuejax.report.fit_overlay import FitOverlay
+from tissuejax.report.fit_overlay import FitOverlay, Shown
 from tissuejax.report.overview import Overview
 from tissuejax.report.plot import band, grid
 from tissuejax.report.probed_shape import ProbedShape
@@ -50,6 +50,9 @@ def test_every_panel_of_a_cyclic_test_has_its_band_and_the_legend_names_all():
     for ax in figure.axes:
         (patch,) = ax.patches
         assert patch.get_path().vertices[:, 1].max() <= ax.get_ylim()[1]
+    bare = [Shown(d.curve, None if d.curve.held else d.band, None) for d in data]
+    assert "No band was computed for holdout." in FitOverlay().caption(bare)
+    assert "No band" not in FitOverlay().caption(data)
     named = {text.get_text() for text in figure.legends[0].get_texts()}
     assert named == {"measured", "95 % band", "model", "95 % band, held out", "model, held out"}
 

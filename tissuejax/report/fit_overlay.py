@@ -56,6 +56,8 @@ class FitOverlay(Plot):
         text = f"Measured and fitted, {len(data)} series, over what was done and over time."
         if any(s.band is not None for s in data):
             text += " Band: where 95 % of measured values should lie, from the estimates' errors and the noise."
+            missing = list(dict.fromkeys(s.recording for s in data if s.band is None))
+            text += f" No band was computed for {', '.join(missing)}." if missing else ""
         if any(s.bare is not None for s in data):
             text += " Dashed: the same energy with every effect off, not refitted."
         return text + (" Orange: recordings that took no part in the fit." if any(s.curve.held for s in data) else "")
