@@ -44,4 +44,4 @@ def declared(name: str) -> dict[str, Parameter]:
     """Parameters that the effect called `name` can have, by name; of a series those of its longest."""
     cls = effects()[name]
     series = isinstance(getattr(cls, "terms", None), int)
-    return {d.name: d for d in (cls(terms=MOST_TERMS) if series else cls()).parameters}
+    return {d.name: d for d in (effect(f"{name}-{MOST_TERMS}") if series else cls()).parameters}
