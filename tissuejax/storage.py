@@ -8,6 +8,7 @@ import errno
 import json
 import math
 import os
+import re
 import secrets
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -60,7 +61,8 @@ def _why(error: OSError) -> str:
         return "the disk is full; make room or name an output folder on another disk"
     if error.errno == errno.ENAMETOOLONG:
         return "its name is too long; give a shorter name"
-    return f"{error.strerror or error}; name another output file or folder"
+    inner = re.search(r"error message = '([^']*)'", str(error))  # as HDF5 tells it
+    return f"{error.strerror or (inner[1] if inner else error)}; name another output file or folder"
 
 
 def write_bytes(path: str | os.PathLike, content: bytes) -> Path:

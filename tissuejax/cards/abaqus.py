@@ -8,6 +8,7 @@ from tissuejax.cards.material import POWERS, Material
 from tissuejax.errors import InputError
 
 ABAQUS_MAX = 6  # terms of an Ogden or polynomial energy
+LOGARITHMIC = "((J^2-1)/2 - ln J) / D"
 
 
 class Abaqus(Card):
@@ -23,6 +24,10 @@ class Abaqus(Card):
     )
     source: ClassVar[str] = "Abaqus Analysis User's Guide, Hyperelastic behavior of rubberlike materials"
 
+    def volume_of(self, subject: Material) -> str:
+        """See `Card.volume_of`."""
+        return volume_of(subject)
+
     def lines(self, subject: Material) -> list[str]:
         """*MATERIAL with what belongs below it."""
         body = [f"*MATERIAL, NAME={subject.name}"]
@@ -31,6 +36,12 @@ class Abaqus(Card):
         if subject.volumetric is None:
             body.insert(0, "** D = 0, incompressible: hybrid elements (C3D8H, ...); Abaqus/Explicit wants a D")
         return body + hyperelastic(self, subject, ABAQUS_MAX, ABAQUS_MAX, moduli=bool(subject.prony)) + _prony(subject)
+
+
+def volume_of(subject: Material) -> str:
+    """That of ABAQUS, which CalculiX shares: chains and fibres have one of their own."""
+    own = subject.energy.name == "arruda-boyce" or getattr(subject.energy, "families", 0)
+    return LOGARITHMIC if own else POWERS
 
 
 def hyperelastic(
@@ -71,7 +82,6 @@ def hyperelastic(
         D = subject.compressibilities(1)
         constants = [subject.constants["mu"], subject.constants["lambda_m"], *D]
         return [
-            "** volumetric energy of this law: U = ((J^2-1)/2 - ln J) / D",
             f"*HYPERELASTIC, ARRUDA-BOYCE{tail}",
             row(constants),
         ]
@@ -92,7 +102,6 @@ def _fibres(subject: Material) -> list[str]:
     D = subject.compressibilities(1)
     directions = [f"{number(math.cos(a))}, {number(math.sin(a))}, 0." for a in angles]
     return [
-        "** volumetric energy of this law: U = ((J^2-1)/2 - ln J) / D",
         f"** local directions of the families, for *ORIENTATION, LOCAL DIRECTIONS={len(angles)}:",
         *(f"**   {d}" for d in directions),
         f"*ANISOTROPIC HYPERELASTIC, HOLZAPFEL, LOCAL DIRECTIONS={len(angles)}",

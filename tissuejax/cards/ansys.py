@@ -23,6 +23,10 @@ class Ansys(Card):
     )
     source: ClassVar[str] = "Ansys Mechanical APDL Material Reference, Hyperelasticity and Viscoelasticity"
 
+    def volume_of(self, subject: Material) -> str:
+        """See `Card.volume_of`: chains have one of their own."""
+        return "((J^2-1)/2 - ln J) / d" if subject.energy.name in ("gent", "arruda-boyce") else self.volume
+
     def lines(self, subject: Material) -> list[str]:
         """TB and TBDATA commands of material 1."""
         body = [] if subject.density is None else [f"MP,DENS,1,{number(subject.density)}"]
@@ -45,7 +49,6 @@ class Ansys(Card):
             body += _table(f"TB,HYPER,1,1,{order},OGDEN", [*pairs, *D, *[0.0] * (order - len(D))])
         elif kind in ("gent", "arruda-boyce"):
             option, second = ("GENT", c["Jm"]) if kind == "gent" else ("BOYCE", c["lambda_m"])
-            body.append("! volumetric energy of this law: U = ((J^2-1)/2 - ln J) / d")
             body += _table(f"TB,HYPER,1,1,,{option}", [c["mu"], second, *subject.compressibilities(1)])
         else:
             raise self.none(subject)

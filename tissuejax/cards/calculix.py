@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import ClassVar
 
-from tissuejax.cards.abaqus import hyperelastic
+from tissuejax.cards.abaqus import hyperelastic, volume_of
 from tissuejax.cards.card import Card, number
 from tissuejax.cards.material import POWERS, Material
 from tissuejax.energies.catalogue import volumetric
@@ -21,6 +21,10 @@ class Calculix(Card):
     volume: ClassVar[str] = POWERS
     ogden: ClassVar[str] = "2mu/alpha^2"
     source: ClassVar[str] = "CalculiX CrunchiX User's Manual 2.20, *HYPERELASTIC"
+
+    def volume_of(self, subject: Material) -> str:
+        """See `Card.volume_of`."""
+        return volume_of(subject)
 
     def lines(self, subject: Material) -> list[str]:
         """*MATERIAL with what belongs below it; an incompressible fit gets a penalty, as D = 0 is a default there."""

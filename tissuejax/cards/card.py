@@ -37,6 +37,10 @@ class Card(abc.ABC):
             InputError: a law this solver has no card for.
         """
 
+    def volume_of(self, subject: Material) -> str:
+        """The volumetric energy that the solver has beside this law."""
+        return self.volume
+
     def text(self, subject: Material) -> str:
         """The whole card.
 
@@ -48,9 +52,9 @@ class Card(abc.ABC):
                 f"{self.name} has no card for relaxation of the stress of {name_of(subject.energy)} at finite strain; "
                 "export to one that has (abaqus, febio, ansys), or a fit without viscoelasticity"
             )
-        body = self.lines(subject)
-        head = described(noted(subject, subject.volume_note(self.volume)))
-        head.append(f"{self.name} card; conventions from {self.source}; volumetric energy U = {self.volume}")
+        body, volume = self.lines(subject), self.volume_of(subject)
+        head = described(noted(subject, subject.volume_note(volume)))
+        head.append(f"{self.name} card; conventions from {self.source}; volumetric energy U = {volume}")
         if subject.energy.name == "ogden":
             head.append(f"Ogden constants converted to form {self.ogden}")
         if subject.prony:

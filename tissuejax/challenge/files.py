@@ -47,7 +47,7 @@ def read_manifest(folder: Path) -> dict:
     """
     path = Path(folder) / "manifest.json"
     if not path.exists():
-        raise InputError(f"{path}: no such file; make a challenge first with `tissuejax challenge make --out {folder}`")
+        raise InputError(f"{path}: no such file; make a challenge first with `tissuejax challenge make {folder}`")
     return json.loads(path.read_text())
 
 

@@ -89,8 +89,8 @@ was stopped goes on where it was when the same command is given again. Material 
             keep=out / "runs",
             known=given.known,
         )
-        reply = diagnosed(found, write_diagnosis(found, out))
         again = _fit_with(found, sample, given)
+        reply = diagnosed(found, write_diagnosis(found, out, again=again))
         return reply if not again else Reply(reply.record | {"fit": again}, f"{reply.text}\nfit      {again}")
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from tissuejax.cards.catalogue import card, cards
-from tissuejax.cards.material import UNITS, material
+from tissuejax.cards.material import UNITS, material, noted
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.results import add_source, known
 from tissuejax.errors import InputError
@@ -58,7 +58,10 @@ solver can; elsewhere it gets a bulk modulus of 1000 shear moduli, said in the c
         density = None if given.density is None else quantity(given.density, "kg/m^3", "--density")
         bulk = None if given.bulk is None else quantity(given.bulk, "Pa", "--bulk")
         name = given.name or of.name
-        subject = material(of.model, of.values, name, density, given.units, bulk)
+        doubts = ("bound", "unstable", "misfit exceeds")
+        warned = [w for w in of.record.get("warnings", ()) if any(d in w.lower() for d in doubts)]
+        plain = material(of.model, of.values, name, density, given.units, bulk)
+        subject = noted(plain, *(f"of the fit: {w}" for w in warned))
         out, written, refused = given.out or Path("out") / f"{name}-cards", {}, {}
         endings = {Path(f"a{card(solver).suffix}").suffix for solver in cards()}
         single = given.out is not None and given.out.suffix.lower() in endings and not given.out.is_dir()
@@ -70,7 +73,7 @@ solver can; elsewhere it gets a bulk modulus of 1000 shear moduli, said in the c
             try:
                 text = card(solver).text(subject)
             except InputError as error:
-                if given.to:
+                if given.to and len(given.to) == 1:
                     raise
                 refused[solver] = str(error)
                 continue
@@ -80,12 +83,9 @@ solver can; elsewhere it gets a bulk modulus of 1000 shear moduli, said in the c
         lines = [f"{solver:<10}{path}" for solver, path in written.items()]
         lines += [f"  ! {solver}: {why}" for solver, why in refused.items()]
         lines += [f"  ! {note}" for note in subject.notes]
-        doubts = ("bound", "unstable", "misfit exceeds")
-        warned = [w for w in of.record.get("warnings", ()) if any(d in w.lower() for d in doubts)]
-        lines += [f"  ! of the fit: {warning}" for warning in warned]
         record = {
             "cards": {s: str(p) for s, p in written.items()},
             "refused": refused,
-            "notes": list(subject.notes) + warned,
+            "notes": list(subject.notes),
         }
         return Reply(record, "\n".join(lines))

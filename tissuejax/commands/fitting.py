@@ -9,11 +9,12 @@ from typing import ClassVar
 from tissuejax import verbs
 from tissuejax.commands.arguments import add_fit, add_model, fit_options
 from tissuejax.commands.command import SUSPECT, Command, Reply
-from tissuejax.commands.outputs import KEPT, add_out, folder, made, refuse_other
+from tissuejax.commands.outputs import KEPT, add_out, folder, made, refuse_other, refuse_other_data
 from tissuejax.errors import InputError
 from tissuejax.fitting.advice import suspect
 from tissuejax.fitting.first import First
 from tissuejax.fitting.result import Fit, described
+from tissuejax.fitting.setup import split
 from tissuejax.model import Model
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read, read_all
@@ -78,6 +79,8 @@ misfit of several times the noise. With 3 and 4 what was found is written all th
             given.energy, ogden_form=given.ogden_form, volumetric=given.volumetric, effects=given.effect
         ).across(tuple(sample.recordings))
         out = folder(given.out, "fit", sample.name, _named(model), given.force)
+        if not given.force:
+            refuse_other_data(out, *split(sample, tuple(given.only), tuple(given.holdout)))
         options = fit_options(given, model.parameters, out / KEPT)
         found = verbs.fit(sample, model, first=given.first, progress=for_terminal(), **options)
         return reply(found, verbs.write(found, out))
@@ -126,8 +129,9 @@ def begun(first: First) -> str:
 
 
 def _named(model: Model) -> list[str]:
-    """Energy and effects, for the name of a folder."""
-    return [described(model)["name"], *(e.name for e in model.effects)]
+    """Energy and effects as they are typed, for the name of a folder."""
+    terms = {e.name: getattr(e, "terms", 1) for e in model.effects}
+    return [described(model)["name"], *(f"{n}-{k}" if isinstance(k, int) and k > 1 else n for n, k in terms.items())]
 
 
 def _code(found: Fit) -> int:

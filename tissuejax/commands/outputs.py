@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from tissuejax.commands.results import effects_of
 from tissuejax.errors import InputError
 
 RECORDS = {  # the file in which a verb says what it made; those with a page share report.html
@@ -97,6 +98,25 @@ def refuse_other(place: Path, mine: dict[str, Any]) -> None:
             raise InputError(f"{place}: holds {what}; name another folder with --out, or give --force to overwrite it")
 
 
+def refuse_other_data(place: Path, fitted: Sequence[str], held: Sequence[str]) -> None:
+    """Refuse a folder that holds a fit to other recordings of the same sample.
+
+    Raises:
+        InputError: says to which, and what to do.
+    """
+    try:
+        record = json.loads((place / "result.json").read_text("utf-8"))
+        there = sorted(record["recordings"]), sorted({key.split("/")[0] for key in record["holdout"]})
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return
+    if there != (sorted(fitted), sorted(held)):
+        held_out = f", {', '.join(there[1])} held out" if there[1] else ""
+        raise InputError(
+            f"{place}: holds the fit to {', '.join(there[0])}{held_out}; name another folder with --out, or give "
+            "--force to overwrite it"
+        )
+
+
 def _plain(record: dict[str, Any]) -> tuple[str, str, tuple[str, ...]]:
     first, *rest = record["model"] or [""]
     return record["verb"], record["sample"], (first, *sorted(rest)) if record["model"] else ()
@@ -112,6 +132,6 @@ def _told(path: Path) -> tuple[str, str, tuple[str, ...]] | None:
         energy = energy["name"] if isinstance(energy, dict) else energy
         if "verdict" in record:
             return "diagnosis", record["sample"], (energy,)
-        return "fit", record["sample"], (energy, *sorted(record["effects"]))
+        return "fit", record["sample"], (energy, *sorted(effects_of(record)))
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None

@@ -45,6 +45,8 @@ def read_problem(path: Path) -> dict:
         raise InputError(f"{path}: found text that is not YAML{place}, expected a problem file") from error
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
+    if content is None:
+        raise InputError(f"{path}: is empty, expected a problem file; see docs/problem-file.md")
     wrong = sorted(jsonschema.Draft202012Validator(schema()).iter_errors(content), key=lambda e: list(map(str, e.path)))
     if wrong:
         place = ".".join(map(str, wrong[0].absolute_path)) or "the file"

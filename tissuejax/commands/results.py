@@ -108,6 +108,9 @@ def read_result(path: Path) -> Known:
     """
     try:
         record = read_record(path)
+        if "verdict" in record:
+            again = record.get("fit", "tissuejax fit ... --effect NAME with what it named")
+            raise InputError(f"{path}: holds a diagnosis; fit with what it named first ({again}), and give that result")
         energy, parameters = record["energy"], record["parameters"]
         model = verbs.material(
             energy["name"],

@@ -99,12 +99,14 @@ class Kept(NamedTuple):
         values: the columns of these rows, deformation counted from its new zero.
         sizes: specimen sizes; the height is the new one where lengths were measured.
         notes: what was done.
+        zero: what the deformation read where it counts from; None where that was not moved.
     """
 
     rows: np.ndarray
     values: dict[str, np.ndarray]
     sizes: Sizes
     notes: list[str]
+    zero: float | None = None
 
 
 @dataclass(frozen=True)
@@ -118,6 +120,7 @@ class Considered:
         motion_name, load_name, motion_unit, load_unit: what they are.
         kept: whether the row is in the recording.
         notes: what was done.
+        zero: of `motion`, from where the deformation counts; None where that was not moved.
     """
 
     name: str
@@ -131,6 +134,7 @@ class Considered:
     kept: Bool[np.ndarray, " n"]
     notes: tuple[str, ...]
     timed: bool = True
+    zero: float | None = None
 
 
 def considered(part: Part, columns: Columns, rows: np.ndarray, sizes: Sizes, name: str, place: str) -> Considered:
@@ -150,7 +154,17 @@ def considered(part: Part, columns: Columns, rows: np.ndarray, sizes: Sizes, nam
     first = {q: values[q].reshape(len(rows), -1)[:, 0] for q in (motion, load)}
     units = QUANTITIES[motion], QUANTITIES[load]
     return Considered(
-        name, time, first[motion], first[load], motion, load, *units, kept, tuple(chosen_rows.notes), timed
+        name,
+        time,
+        first[motion],
+        first[load],
+        motion,
+        load,
+        *units,
+        kept,
+        tuple(chosen_rows.notes),
+        timed,
+        chosen_rows.zero,
     )
 
 
@@ -181,7 +195,7 @@ def selected(part: Part, values: Mapping[str, np.ndarray], kinematic: str, load:
         sizes = {**sizes, "height": zero}
     else:
         left[kinematic] = _from_zero(left[kinematic], kinematic, zero)
-    return Kept(rows, left, sizes, notes + said)
+    return Kept(rows, left, sizes, notes + said, float(zero))
 
 
 def _from_zero(values: np.ndarray, kind: str, zero: float) -> np.ndarray:

@@ -12,12 +12,13 @@ from tissuejax.report.page import figures, render, write_drawn
 from tissuejax.storage import write_json, write_text
 
 
-def write_diagnosis(found: Diagnosis, out: Path, remainders: bool = True) -> dict[str, Path]:
+def write_diagnosis(found: Diagnosis, out: Path, remainders: bool = True, again: str = "") -> dict[str, Path]:
     """result.json, remainder.json, report.html, the figures, curves.csv and parameters.tex, each whole or not at all.
 
     Args:
         found: the diagnosis.
         out: folder, made if missing.
+        again: the command that fits with what was named, for the record and the page.
         remainders: False leaves remainder.json out, which holds the residual sample by sample.
 
     Returns:
@@ -25,7 +26,7 @@ def write_diagnosis(found: Diagnosis, out: Path, remainders: bool = True) -> dic
         and format.
     """
     out = Path(out)
-    record = found.as_dict()
+    record = found.as_dict() | ({"fit": again} if again else {})
     written = {"result": write_json(out / "result.json", record)}
     if remainders:
         written["remainder"] = write_json(out / "remainder.json", found.remainders())

@@ -49,6 +49,9 @@ class KeptRows(Plot):
                 ax.plot(x[lonely], kept[lonely], ".", color=MODEL, markersize=3)
                 ax.set_xlabel(name)
                 ax.set_ylabel(f"{one.load_name.replace('_', ' ')}{label(load_unit)}")
+            if one.zero is not None:
+                axes[2 * k + 1].axvline(one.zero / by_motion, color=INK, linewidth=0.8, linestyle=":", label="new zero")
+                axes[2 * k + 1].legend(frameon=False, fontsize=8, loc="best")
             axes[2 * k].set_title(one.name, loc="left", fontsize=9.5, color=INK)
             axes[2 * k].legend(frameon=False, fontsize=8, loc="best")
         return figure
