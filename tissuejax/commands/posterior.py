@@ -9,8 +9,11 @@ from tissuejax import verbs
 from tissuejax.commands.arguments import add_fit, add_model, fit_options, positive
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.outputs import add_out, folder, listed, made
-from tissuejax.errors import unknown
+from tissuejax.errors import InputError, unknown
+from tissuejax.experiments.catalogue import experiment
+from tissuejax.experiments.predictor import predictor
 from tissuejax.fitting.result import described
+from tissuejax.fitting.setup import problem, split
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read
 from tissuejax.report.page import write_figures
@@ -52,7 +55,7 @@ Needs the extra `bayes`: pip install 'tissuejax[bayes]'.
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Fit, draw, write."""
-        from tissuejax.fitting.evidence import evidence
+        from tissuejax.fitting.evidence import evidence, refuse_improper
         from tissuejax.fitting.posterior import laplace, nuts, target_of
         from tissuejax.report.posterior_pairs import Drawn, write_latex
 
@@ -64,7 +67,16 @@ Needs the extra `bayes`: pip install 'tissuejax[bayes]'.
         ).across(tuple(sample.recordings))
         named = [described(model)["name"], *(e.name for e in model.effects)]
         out = folder(given.out, "posterior", sample.name, named, given.force)
-        found = verbs.fit(sample, model, progress=for_terminal(), **fit_options(given, model.parameters))
+        options = fit_options(given, model.parameters)
+        fitted, _ = split(sample, tuple(given.only), tuple(given.holdout))
+        for name in fitted:
+            if experiment(sample.recordings[name].experiment).kind != "homogeneous":
+                raise InputError(
+                    f"recording {name}: draws are of material tests only; `tissuejax profile` takes others too"
+                )
+        if given.evidence:
+            refuse_improper(problem(predictor(model, sample, fitted), options["unknowns"], options["objective"]))
+        found = verbs.fit(sample, model, progress=for_terminal(), **options)
         target, mode = target_of(found), np.array([found.values[p] for p in found.free])
         draws = positive(given.draws, "--draws")
         if given.sampler == "laplace":

@@ -15,6 +15,7 @@ from tissuejax.tled.shapes import Sphere
 
 PRESSURES = (1.0, 5e5)  # Pa over the cross section of the ball: below nothing is felt, above soft tissue is torn
 LARGEST = 3.0  # m: no rig is as large
+ALREADY = 0.1  # of the tip's radius below the surface at the first sample
 LOADED = 0.5  # of the largest force, at the first sample: nothing was zeroed, or the start is missing
 
 
@@ -64,7 +65,7 @@ def _probing(recording: Recording, points: Float[np.ndarray, "N 3"], top: Facets
     few = path[:: max(1, len(path) // 400)]
     gap = surface_gap(few, tip, points, top)
     said = []
-    if gap[0] < -INSIDE:
+    if gap[0] < -min(INSIDE, ALREADY * float(tip.reach())):
         said.append(
             f"the probe starts {-1e3 * gap[0]:.1f} mm inside the tissue; it must start outside: check the radius, the "
             "registration of probe and body and the units"

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.errors import InputError
+from tissuejax.estimation.problem import Problem
 from tissuejax.fitting.target import Target
 
 MOST_PARAMETERS = 10  # parameters
@@ -35,6 +36,21 @@ class Evidence:
     draws: Float[np.ndarray, "r n p"]
 
 
+def refuse_improper(problem: Problem) -> None:
+    """Refuse a problem that has no evidence, before anything is fitted.
+
+    Raises:
+        InputError: a parameter without prior whose bounds are not both finite, or more than ten parameters.
+    """
+    if len(problem.free) > MOST_PARAMETERS:
+        raise InputError(
+            f"{len(problem.free)} free parameters; evidence is computed for at most {MOST_PARAMETERS}: fix some"
+        )
+    bad = [p for p in problem.free if p not in problem.priors and not np.isfinite(np.ptp(problem.bound(p)))]
+    if bad:
+        raise InputError(f"evidence needs proper priors: give {', '.join(bad)} a --prior, or both --bounds")
+
+
 def evidence(target: Target, particles: int = 500, runs: int = 4, seed: int = 0) -> Evidence:
     """The evidence under proper priors: normal where one was given (cut at the bounds), else flat between the bounds.
 
@@ -42,14 +58,8 @@ def evidence(target: Target, particles: int = 500, runs: int = 4, seed: int = 0)
         InputError: a parameter without prior whose bounds are not both finite, or more than ten parameters.
     """
     problem = target.problem
-    if len(problem.free) > MOST_PARAMETERS:
-        raise InputError(
-            f"{len(problem.free)} free parameters; evidence is computed for at most {MOST_PARAMETERS}: fix some"
-        )
+    refuse_improper(problem)
     lower, upper = (np.array([problem.bound(p)[k] for p in problem.free]) for k in (0, 1))
-    bad = [p for p, a, b in zip(problem.free, lower, upper) if p not in problem.priors and not np.isfinite(b - a)]
-    if bad:
-        raise InputError(f"evidence needs proper priors: give {', '.join(bad)} a --prior, or both --bounds")
     sigma = target._sigma
     constant = -float(np.sum(np.log(sigma))) - 0.5 * len(sigma) * math.log(2 * math.pi)
 
