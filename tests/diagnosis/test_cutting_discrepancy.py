@@ -34,7 +34,7 @@ def named(made):
 def test_what_is_smooth_in_place_belongs_to_one_stroke_and_to_its_way_through_fresh_tissue():
     bench = CuttingBench.of(made(lambda name, x: 20.0 + 0 * x), NeoHookean(), ("slow", "middle", "quick"), ())
     cut = blocks(bench)
-    parts = cutting_discrepancy(bench, cut, bench.fresh).about(np.ones(len(cut.starts)))
+    parts = cutting_discrepancy(bench, cut, bench.fresh, bench.bevels).about(np.ones(len(cut.starts)))
     place = next(p for p in parts if p.name == "place").factor
     covariance = place @ place.T
     fresh = cut.mean(np.concatenate([bench.fresh[s.recording] for s in bench.segments]))
@@ -42,7 +42,11 @@ def test_what_is_smooth_in_place_belongs_to_one_stroke_and_to_its_way_through_fr
     assert np.diag(covariance)[fresh == 1] == pytest.approx(1.0, abs=1e-3)
     apart = cut.owner[:, None] != cut.owner
     assert np.abs(covariance[apart]).max() == 0
-    assert {p.family for p in parts} == {"law", "gain", "onset", "slow", "white"}
+    assert {p.family for p in parts} == {"law", "gain", "onset", "peak", "slow", "white"}
+    entry = next(p for p in parts if p.name == "peak").factor
+    x = cut.mean(np.concatenate([np.asarray(s.drive) for s in bench.segments]))
+    assert np.abs(entry[x > 3 * max(bench.bevels.values())]).max() < 1e-3  # over within a bevel
+    assert (np.count_nonzero(entry, axis=1) <= 1).all()  # of one stroke each
 
 
 @pytest.mark.slow

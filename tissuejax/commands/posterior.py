@@ -72,7 +72,7 @@ Needs the extra `bayes`: pip install 'tissuejax[bayes]'.
         for name in fitted:
             if experiment(sample.recordings[name].experiment).kind != "homogeneous":
                 raise InputError(
-                    f"recording {name}: draws are of material tests only; `tissuejax profile` takes others too"
+                    f"recording {name}: posteriors are for material tests; a probing has `profile` and standard errors"
                 )
         if given.evidence:
             refuse_improper(problem(predictor(model, sample, fitted), options["unknowns"], options["objective"]))

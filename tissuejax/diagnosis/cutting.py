@@ -29,7 +29,7 @@ from tissuejax.errors import unknown
 from tissuejax.estimation.series import Driven, Series
 from tissuejax.experiments.cutting import balance_force
 from tissuejax.experiments.cutting_layers import ages, layer
-from tissuejax.experiments.cutting_record import FORCE, Path, steady
+from tissuejax.experiments.cutting_record import FORCE, Path, bevel_of, steady
 from tissuejax.experiments.predictor import predictor
 from tissuejax.model import Model
 from tissuejax.parameters import under
@@ -42,7 +42,12 @@ WEDGING = 0.05  # share of the force that the modulus gives to wedging at the st
 
 
 class CuttingBench(Bench):
-    """Cuts of one sample; see `Bench`. `fresh`: by recording, the share of the motion that parts new tissue."""
+    """Cuts of one sample; see `Bench`.
+
+    Attributes:
+        fresh: by recording, the share of the motion that parts new tissue.
+        bevels: by recording, how long a bevel is along the way, m.
+    """
 
     @classmethod
     def of(
@@ -101,6 +106,7 @@ class CuttingBench(Bench):
             bench._paths = {n: (ways[n], ages(ways[n]), seen[n]) for n in p.names}
         else:
             bench._paths = like._paths
+        bench.bevels = {n: bevel_of(w) for n, w in p.paths_of.items()}
         clocks = {s.recording: s.time for s in segments}
         bench.fresh = {n: np.interp(clocks[n], w.time, w.fresh * (w.speed > 0)) for n, w in p.paths_of.items()}
         return bench

@@ -4,13 +4,15 @@ Unlike that of material tests it is no function of the place that all strokes sh
 has a place of its own in the body, and what the tissue does there is its toughness. So what is smooth in place, of each
 stroke's own and where it parts tissue, is the business of `toughness-map` and usual in size unless that is named; a
 gain of each stroke's own (sites differ, so do zeroes of a depth), how the force sets in at the entry, what wanders in
-time and what scatters may be strange without a name.
+time and what scatters may be strange without a name. Until the shoulder of a blade is in, all of its bevel works while
+faces part ahead of it: the force passes a peak that a balance of energies has not.
 
 | part | form, a share of |
 |---|---|
 | place, fine place | squared exponential in place (0.4 and 0.12 of the way) where fresh tissue is parted: prediction |
 | gain | constant, of each stroke's own: prediction |
 | onset | squared exponential in place (0.12) fading over `ENTRY` from the entry, of each stroke's own: prediction |
+| peak | falling off from one bevel behind the entry on, over a quarter of one, of each stroke's own: prediction |
 | slow | exponential in time (0.05, 0.25 and 1.5 of the record), of each stroke's own: `WANDER` of the greatest force |
 | white | what scatters from sample to sample beyond the stated noise: greatest force |
 """
@@ -27,6 +29,7 @@ from tissuejax.estimation.discrepancy import LAW, SLOW, Part, smooth_factor
 
 PLACE = {"place": 0.4, "fine place": LAW["fine law"]}  # correlation lengths, of the longest way
 ENTRY = 4e-3  # m: twice the length over which a force sets in
+PEAK = 0.25  # bevels over which the entry's peak is over
 WANDER = 0.3  # of what wanders in material tests: a cut is over in a minute, and a zero that goes farther is a drift
 MAP = Candidate("toughness-map", (), form="of each stroke's own", widens={"law": 0.15})
 
@@ -43,10 +46,13 @@ class CuttingDiscrepancy:
         return (*(Part(name, family, prediction[:, None] * f) for name, family, f in self.shaped), *self.fixed)
 
 
-def cutting_discrepancy(bench: Bench, cut: Blocks, fresh: Mapping[str, Float[np.ndarray, " n"]]) -> CuttingDiscrepancy:
+def cutting_discrepancy(
+    bench: Bench, cut: Blocks, fresh: Mapping[str, Float[np.ndarray, " n"]], bevels: Mapping[str, float]
+) -> CuttingDiscrepancy:
     """The discrepancy of the strokes of a bench.
 
     Args:
+        bevels: by recording, how long a bevel is along the way, m.
         fresh: by recording, the share of the motion that parts new tissue at each of its samples.
     """
     rows = [np.flatnonzero(cut.owner == k) for k in range(len(bench.segments))]
@@ -66,6 +72,8 @@ def cutting_discrepancy(bench: Bench, cut: Blocks, fresh: Mapping[str, Float[np.
     belongs = (cut.owner[:, None] == np.arange(len(rows))).astype(float)
     shaped.append(("gain", "gain", belongs))
     shaped.append(("onset", "onset", own(LAW["fine law"], parts * np.exp(-np.maximum(place, 0.0) / ENTRY))))
+    bevel = np.array([bevels[s.recording] for s in bench.segments])[cut.owner]
+    shaped.append(("peak", "peak", belongs * (parts * np.exp(-np.maximum(place / bevel - 1, 0.0) / PEAK))[:, None]))
     peaks = [float(np.quantile(np.abs(bench.y[s.rows]), 0.98)) or 1.0 for s in bench.segments]
     fixed = []
     for name, share in SLOW.items():

@@ -12,8 +12,6 @@ FORCE = "cutting_force"
 ANGLE = 30.0  # degrees between the bevels where a file does not say
 START = 1e-3  # m: a record whose blade is deeper in the tissue than this at its first sample starts in the cut
 TURNING = 3.0  # bevels
-# Bevels: until the shoulder is in, all of the bevel works while faces part ahead of it; the force passes a peak there
-ENTERED = 1.5
 FACTOR = 1e-2  # a thickness of more than this in m is not a blade's
 
 
@@ -97,10 +95,15 @@ def path_of(recording: Recording, geometry: Geometry) -> Path:
     )
 
 
+def bevel_of(path: Path) -> float:
+    """Length of a bevel along the way, m."""
+    return float(0.5 * path.thickness / np.tan(path.angle / 2))
+
+
 def steady(path: Path, time: Float[np.ndarray, " m"]) -> np.ndarray:
     """True where a balance of energies has something to say: not at a turn of the blade nor within `TURNING` bevels
-    after it, of the end of a cut made before or of the far side of the tissue, nor within `ENTERED` of the entry."""
-    bevel = 0.5 * path.thickness / np.tan(path.angle / 2)
+    after it, of the end of a cut made before or of the far side of the tissue, nor within one of the entry."""
+    bevel = bevel_of(path)
     step = np.diff(path.x, prepend=path.x[0])
     heading = np.sign(np.where(np.abs(step) > 1e-9, step, 0.0))
     last, since, way = 1.0, np.inf, np.zeros(len(step))
@@ -110,7 +113,7 @@ def steady(path: Path, time: Float[np.ndarray, " m"]) -> np.ndarray:
         way[i] = since
     old = np.maximum.accumulate(np.concatenate([[path.notch], path.front[:-1]]))
     joining = (np.abs(path.x - old) < TURNING * bevel) & np.isfinite(way)
-    out = (path.x > path.length - bevel) | (np.abs(path.x) < ENTERED * bevel)
+    out = (path.x > path.length - bevel) | (np.abs(path.x) < bevel)
     turn = heading != np.append(heading[1:], heading[-1])  # a sample at a turn belongs to neither stroke
     calm = (way > TURNING * bevel) & (heading != 0) & ~turn & ~joining & ~out
     return np.interp(time, path.time, calm) > 0.99

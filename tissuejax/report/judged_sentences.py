@@ -25,6 +25,7 @@ PARTS = {
     "speed": "what the speed of the simulation leaves open",
     "crosstalk": "vertical force in the lateral ones",
     "onset": "where the surface is met",
+    "peak": "a peak where the blade's shoulder enters",
 }
 
 SEEN = 1e-5  # of the peak: no sensor tells less, and an amplitude at its bound is rounding

@@ -66,7 +66,7 @@ class Scales:
         named = {f: c.name for c in candidates.values() for f in c.widens}
         wide = {f: w for key in keys for f, w in candidates[key].widens.items()}
         acting = {candidates[key].name for key in keys}
-        free = np.array([f not in named for f in self.families])
+        free = np.array([f not in named and f not in criteria.settled for f in self.families])
         partly = np.array([f not in wide and named.get(f) in acting for f in self.families])
         width = np.array([wide.get(f, criteria.shares[f]) for f in self.families])
         sudden = np.array([f == "sudden" for f in self.families])

@@ -38,7 +38,7 @@ class Cuts(Recorded):
     def left(self) -> tuple[Blocks, Discrepancy]:
         """See `Recorded.left`."""
         cut, whole = blocks(self.whole), self.whole
-        return cut, cutting_discrepancy(whole, cut, whole.fresh)
+        return cut, cutting_discrepancy(whole, cut, whole.fresh, whole.bevels)
 
     def finished(self, found: Answered) -> Diagnosis:
         """See `Recorded.finished`."""
