@@ -71,7 +71,11 @@ def test_a_noise_level_a_little_low_is_not_something_missing():
     assert not beyond_noise(found)
     assert "as well as the noise allows" in sentences.overall(found)
     assert not any("lack" in step for step in sentences.next_steps(found))
-    worse = tj.fit(sample(5.0, stated=2.5), "neo-hookean", search=ONCE)
+    little = tj.fit(sample(5.0, stated=2.5), "neo-hookean", search=ONCE)  # 4 of 1,500 Pa: of no note, as in a judgement
+    assert not beyond_noise(little)
+    assert "of no note" in sentences.overall(little)
+    assert any("is the noise level right?" in w for w in little.warnings)
+    worse = tj.fit(sample(60.0, stated=25.0), "neo-hookean", search=ONCE)
     assert "something is missing" in sentences.overall(worse)
     assert any("lacks" in step for step in sentences.next_steps(worse))
     assert any("exceeds the noise" in w for w in worse.warnings)

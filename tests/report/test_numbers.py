@@ -129,6 +129,6 @@ def test_a_diagnosis_in_numbers(tmp_path):
 
 def test_the_page_of_a_campaign_is_printable(tmp_path):
     rows = [{"sample": f"s{k}", "energy.mu (Pa)": 1000.0 + k} for k in range(5)]
-    counts = {"cases": 5, "done": 5, "failed": 0, "missing": 0}
+    counts = {"cases": 5, "done": 5, "failed": 0, "missing": 0, "suspect": 0, "suspect_kinds": {}, "usable": 5}
     write_cohort(rows, counts, tmp_path)
     assert printed(tmp_path) == {"cohort.svg", "cohort.pdf"}

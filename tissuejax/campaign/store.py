@@ -38,8 +38,8 @@ class Store:
         try:
             plan = json.loads((self.folder / PLAN).read_text())
             return [Task.of(t) for t in plan["tasks"]], int(plan["retries"])
-        except FileNotFoundError:
-            raise InputError(f"{self.folder}: no campaign here; begin one with `campaign run`") from None
+        except FileNotFoundError as error:
+            raise InputError(f"{self.folder}: no campaign here; begin one with `campaign run`") from error
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise InputError(f"{self.folder}: no campaign here ({error}); begin one with `campaign run`") from error
 
@@ -51,8 +51,6 @@ class Store:
         """The row of a key, None if there is none that can be read."""
         try:
             return json.loads(self.path(key).read_text())
-        except FileNotFoundError:
-            raise InputError(f"{self.folder}: no campaign here; begin one with `campaign run`") from None
         except (OSError, ValueError):
             return None
 
@@ -73,8 +71,6 @@ class Store:
         """How many times a case without a row was begun."""
         try:
             return int((self.folder / "running" / key).read_text() or 0)
-        except FileNotFoundError:
-            raise InputError(f"{self.folder}: no campaign here; begin one with `campaign run`") from None
         except (OSError, ValueError):
             return 0
 

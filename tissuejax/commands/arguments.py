@@ -144,7 +144,7 @@ def number(text: str, parameter: Parameter, what: str) -> float:
 def seed(text: str) -> int:
     """A seed as argparse reads it: a whole number from 0 on."""
     if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"found {text}, expected a whole number from 0 on")
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected a whole number from 0 on")
     return int(text)
 
 

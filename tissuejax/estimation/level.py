@@ -22,7 +22,7 @@ from scipy.signal import lfilter
 from tissuejax.estimation.correlation import LEAST, Series, estimate
 from tissuejax.estimation.noise import Noise
 
-NEGLIGIBLE = 0.005  # of the peak: half of what load cells are verified to (class 1 of ISO 7500-1)
+OF_NOTE = 0.005  # of the peak: half of what load cells are verified to (class 1 of ISO 7500-1)
 THIRD = np.array([1.0, -3.0, 3.0, -1.0])
 POWERS = (1, 2, 3)
 FADES = (0.012, 0.08, 0.5)  # of the recording: times over which the response forgets

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tissuejax.estimation.level import NEGLIGIBLE
+from tissuejax.estimation.level import OF_NOTE
 from tissuejax.estimation.stability import sentence
 from tissuejax.fitting.memory import begun_loaded, times
 
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from tissuejax.fitting.result import Fit
 
 MISFIT = 1.5  # chi-square per sample from which the misfit is called larger than the noise
+NO_NOTE = f"less than {OF_NOTE:.1%} of the largest value, which is of no note"
 SERIAL = 0.5  # lag-one correlation of residuals from which standard errors are called optimistic
 CONDITION = 1e6
 TWINS = 0.05  # of their ratio: relaxation times closer than that are one
@@ -94,21 +95,28 @@ def numerics_sentence(found: "Fit") -> str:
     )
 
 
-def beyond_noise(found: "Fit") -> dict[str, float]:
-    """Channels whose misfit exceeds the recorded noise, and how many times: the one test of "something is missing".
+def misfits(found: "Fit") -> dict[str, float]:
+    """Channels whose misfit exceeds the recorded noise, and how many times.
 
-    A noise level estimated from few samples may be a quarter too low, hence the margin of `MISFIT`; and as in a
-    judgement, what is left beyond the noise counts from `NEGLIGIBLE` of the largest value on.
+    A noise level estimated from few samples may be a quarter too low, hence the margin of `MISFIT`.
     """
-    groups, recordings = found.problem.noise.groups, found.problem.predictor.sample.recordings
-    times = {}
-    for key, s in found.channels.items():
+    known = {k: s for k, s in found.channels.items() if k not in found.problem.noise.groups}
+    return {k: math.sqrt(s.chi2_per_sample) for k, s in known.items() if s.chi2_per_sample > MISFIT}
+
+
+def beyond_noise(found: "Fit") -> dict[str, float]:
+    """The misfits that count: the one test of "something is missing".
+
+    As in a judgement, what is left beyond the noise is of note from `OF_NOTE` of the largest value on.
+    """
+    recordings, counted = found.problem.predictor.sample.recordings, {}
+    for key, ratio in misfits(found).items():
         name, channel = key.split("/", 1)
         top = float(np.nanquantile(np.abs(recordings[name].channels[channel].values), 0.98))
-        rest = s.rmse * math.sqrt(max(0.0, 1 - 1 / max(s.chi2_per_sample, 1e-12)))
-        if key not in groups and s.chi2_per_sample > MISFIT and (channel == "markers" or rest > NEGLIGIBLE * top):
-            times[key] = math.sqrt(s.chi2_per_sample)
-    return times
+        rest = found.channels[key].rmse * math.sqrt(1 - 1 / ratio**2)
+        if channel == "markers" or rest > OF_NOTE * top:
+            counted[key] = ratio
+    return counted
 
 
 def suspicions(found: "Fit") -> dict[str, list[str]]:
@@ -116,7 +124,7 @@ def suspicions(found: "Fit") -> dict[str, list[str]]:
     said = {"at a bound": [f"{path} ended at its {side} bound" for path, side in found.at_bound.items()]}
     if sentence(found.stability):
         said["unstable"] = ["the fitted energy is unstable inside the recorded range"]
-    worst = max(beyond_noise(found).values(), default=0.0)
+    worst = max(misfits(found).values(), default=0.0)
     if worst > GROSS:
         said["misfit"] = [f"the misfit is {worst:.3g} times the noise"]
     return {kind: why for kind, why in said.items() if why}
@@ -128,7 +136,7 @@ def suspect(found: "Fit") -> list[str]:
 
 
 def _misfit(found: "Fit") -> list[str]:
-    bad = beyond_noise(found)
+    bad, of_note = misfits(found), beyond_noise(found)
     small = {k: math.sqrt(s.chi2_per_sample) for k, s in found.channels.items() if k not in found.problem.noise.groups}
     if small and math.isfinite(found.uncertainty.dof) and max(small.values()) < 1:
         return [
@@ -139,9 +147,9 @@ def _misfit(found: "Fit") -> list[str]:
         return []
     worst = sorted(bad, key=bad.get, reverse=True)
     shown = ", ".join(f"{key} {bad[key]:.1f} times" for key in worst[:6]) + (", ..." if len(bad) > 6 else "")
-    return [
-        f"The misfit exceeds the noise ({shown}): the model lacks something. Standard errors were widened accordingly."
-    ]
+    why = "the model lacks something" if of_note else f"by {NO_NOTE}; is the noise level right?"
+    end = "." if of_note else ""
+    return [f"The misfit exceeds the noise ({shown}): {why}{end} Standard errors were widened accordingly."]
 
 
 def _serial(found: "Fit") -> list[str]:

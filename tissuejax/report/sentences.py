@@ -3,7 +3,7 @@
 import math
 
 from tissuejax.energies.catalogue import name_of
-from tissuejax.fitting.advice import beyond_noise
+from tissuejax.fitting.advice import NO_NOTE, beyond_noise, misfits
 from tissuejax.fitting.result import Fit
 from tissuejax.report.scales import display, with_std
 
@@ -32,12 +32,12 @@ def overall(found: Fit) -> str:
         return (
             f"The model leaves {_range(found.channels)}; the noise was not recorded, so this is all that can be said."
         )
-    bad = beyond_noise(found)
-    verdict = (
-        f"to within {max(bad.values()):.1f} times the noise, so something is missing from the model"
-        if bad
-        else "as well as the noise allows"
-    )
+    bad, small = beyond_noise(found), misfits(found)
+    verdict = "as well as the noise allows"
+    if bad:
+        verdict = f"to within {max(bad.values()):.1f} times the noise, so something is missing from the model"
+    elif small:
+        verdict = f"to within {max(small.values()):.1f} times the noise; what is beyond it is {NO_NOTE}"
     ratio = found.chi2_per_dof
     return f"It describes them {verdict} ({_range(found.channels)}, chi-square per degree of freedom {ratio:.3g})."
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tissuejax.estimation.level import NEGLIGIBLE
+from tissuejax.estimation.level import OF_NOTE
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Criteria:
     change: float = 0.3
     rig: float = 0.1
     shape: float = float(np.log(5.0))
-    negligible: float = NEGLIGIBLE
+    negligible: float = OF_NOTE
     unseen: float = 0.5
     misstated: float = 2.0
     named: float = 0.5
