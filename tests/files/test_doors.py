@@ -286,3 +286,23 @@ def test_a_line_break_in_a_name_is_shown(tmp_path, capsys):
     capsys.readouterr()
     assert main(["inspect", str(tmp_path / "no\npe.toml")]) == 2
     assert "no\\npe.toml: no such file" in capsys.readouterr().err
+
+
+def test_a_fit_to_other_recordings_does_not_replace_the_one_before(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    fit = ["fit", ELASTIC, "--energy", "neo-hookean", "--multistart", "1"]
+    assert main([*fit, "--holdout", "holdout"]) in (0, 4)
+    before = next((tmp_path / "out").glob("*/result.json")).read_bytes()
+    capsys.readouterr()
+    assert main([*fit, "--only", "tension"]) == 2
+    assert "holds the fit to compression, planar, tension, holdout held out" in capsys.readouterr().err
+    assert next((tmp_path / "out").glob("*/result.json")).read_bytes() == before
+    assert main([*fit, "--only", "tension", "--force"]) in (0, 4)
+    assert next((tmp_path / "out").glob("*/result.json")).read_bytes() != before
+
+
+def test_a_diagnosis_is_no_result_and_says_how_to_get_one(tmp_path, capsys):
+    record = {"verdict": "found", "fit": "tissuejax fit a.h5 --energy neo-hookean --effect slack"}
+    (tmp_path / "result.json").write_text(json.dumps(record))
+    assert main(["export", str(tmp_path / "result.json")]) == 2
+    assert "tissuejax fit a.h5 --energy neo-hookean --effect slack" in capsys.readouterr().err
