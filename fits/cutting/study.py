@@ -38,4 +38,4 @@ def main(folder: Path) -> str:
     whole = [r for r in found["recovery"]["runs"] if r["what"] == "entry included"]
     worst = {n: max(abs(r[f"{n}_percent"]) for r in whole) for n in ("energy", "strength", "friction")}
     off = ", ".join(f"{name} {most:.1f} %" for name, most in worst.items())
-    return f"records of a finer mesh, {len(whole)} fits from 50 % off, at worst: {off}; see {folder / 'report.html'}"
+    return f"records of a finer mesh, {len(whole)} fits from 50 % off, at worst: {off}; see report.html"
