@@ -139,7 +139,7 @@ def _say_unread(store: Store, files: int) -> None:
     if lost:
         print(
             f"tissuejax campaign: {len({task.file for task in lost})} of {files} files can't be read, in whole or in "
-            f"part; that is {len(lost)} failed rows, and the others are worked through: "
+            f"part; that is {len(lost)} failed row{'s' * (len(lost) != 1)}, and the others are worked through: "
             + ", ".join(task.sample for task in lost[:5])
             + (", ..." if len(lost) > 5 else ""),
             file=sys.stderr,
