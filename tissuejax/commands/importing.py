@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import ClassVar
 
 from tissuejax.commands.command import Command, Reply
+from tissuejax.commands.inspecting import remarked
 from tissuejax.errors import InputError
-from tissuejax.experiments.probing_slips import probing_slips
 from tissuejax.mesh import probing_files
 from tissuejax.mesh.probing_files import describes_a_body, probing_sample
 from tissuejax.recordings import cutting_table
@@ -185,7 +185,7 @@ def _probed(given: argparse.Namespace) -> Reply:
     _free(out, given.force)
     sample = probing_sample(side)
     write(sample, out)
-    found = remarks(sample) + probing_slips(sample)
+    found = remarked(sample)
     lines = [sample.notes.replace(". ", ".\n"), *(f"note: {remark}" for remark in found), f"wrote {shown(out)}"]
     quoted = _quoted(out)
     lines += [f"look   tissuejax inspect {quoted} --out look"]

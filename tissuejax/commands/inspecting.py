@@ -8,7 +8,6 @@ import numpy as np
 
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.outputs import folder_named, listed
-from tissuejax.experiments.probing_slips import probing_slips
 from tissuejax.recordings.files import names, read
 from tissuejax.recordings.layouts import LAYOUTS
 from tissuejax.recordings.recording import Recording, Sample
@@ -75,6 +74,16 @@ def _cut(file: str, name: str):
     return Selections(selections(side, name)) or None
 
 
+def remarked(sample: Sample) -> list[str]:
+    """What is unusual, and the slips of probings, whose checks are brought along where there are some."""
+    said = remarks(sample)
+    if any(r.experiment == "probing" for r in sample.recordings.values()):
+        from tissuejax.experiments.probing_slips import probing_slips
+
+        said += probing_slips(sample)
+    return said
+
+
 def described(sample: Sample) -> dict:
     """A sample as plain data."""
     geometry = sample.geometry
@@ -94,7 +103,7 @@ def described(sample: Sample) -> dict:
             "size": np.ptp(geometry.points, axis=0).tolist(),
         },
         "recordings": {name: _recording(r) for name, r in sample.recordings.items()},
-        "remarks": remarks(sample) + probing_slips(sample),
+        "remarks": remarked(sample),
     }
 
 
