@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tissuejax.commands.results import effects_of
 from tissuejax.errors import InputError
 
 RECORDS = {  # the file in which a verb says what it made; those with a page share report.html
@@ -115,6 +114,15 @@ def refuse_other_data(place: Path, fitted: Sequence[str], held: Sequence[str]) -
             f"{place}: holds the fit to {', '.join(there[0])}{held_out}; name another folder with --out, or give "
             "--force to overwrite it"
         )
+
+
+def effects_of(record: dict) -> list[str]:
+    """Names of the effects as they are typed, a Prony series with its number of terms."""
+    found = []
+    for name in record["effects"]:
+        terms = sum(p.startswith(f"effects.{name}.g") for p in record["parameters"])
+        found.append(f"{name}-{terms}" if name == "viscoelasticity" and terms != 1 else name)
+    return found
 
 
 def _plain(record: dict[str, Any]) -> tuple[str, str, tuple[str, ...]]:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from tissuejax import verbs
 from tissuejax.commands.arguments import values as valued
+from tissuejax.commands.outputs import effects_of
 from tissuejax.energies.published import published
 from tissuejax.errors import InputError
 from tissuejax.model import Model
@@ -150,12 +151,3 @@ def no_result(path: Path, error: Exception) -> InputError:
     """That a file is not a fit's record."""
     lacking = f"it has no {error}" if isinstance(error, KeyError) else str(error)
     return InputError(f"{path}: {NOT_A_RESULT} ({lacking}); give the one in its --out")
-
-
-def effects_of(record: dict) -> list[str]:
-    """Names of the effects as they are typed, a Prony series with its number of terms."""
-    found = []
-    for name in record["effects"]:
-        terms = sum(p.startswith(f"effects.{name}.g") for p in record["parameters"])
-        found.append(f"{name}-{terms}" if name == "viscoelasticity" and terms != 1 else name)
-    return found
