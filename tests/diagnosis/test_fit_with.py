@@ -8,10 +8,10 @@ import pytest
 from tests.files.test_plausible import recording, sample
 from tissuejax.commands.diagnose import _fit_with
 
-GIVEN = Namespace(file="a b.h5", energy="ogden-2", ogden_form="mu/alpha")
+GIVEN = Namespace(file="a b.h5", energy="ogden-2", ogden_form="mu/alpha", known=[], only=[])
 
 
-def command(*effects, chosen=True):
+def command(*effects, chosen=True, **options):
     told = [
         {"name": name, "parameters": {f"effects.{name}.{p}": {"value": v} for p, v in values.items()}}
         for name, values in effects
@@ -19,7 +19,7 @@ def command(*effects, chosen=True):
     found = SimpleNamespace(
         as_dict=lambda: {"effects": told, "held_out": ["r2"]}, verdict=SimpleNamespace(chosen=chosen)
     )
-    return _fit_with(found, sample(r=recording()), GIVEN)
+    return _fit_with(found, sample(r=recording()), Namespace(**{**vars(GIVEN), **options}))
 
 
 @pytest.mark.parametrize(
@@ -43,3 +43,8 @@ def test_nothing_is_advised_where_nothing_was_named_or_fit_can_not_be_told():
     assert command(("slack", {"gap": 0.01}), chosen=False) == ""
     assert command(("slack", {"gap.r1": 0.01})) == ""  # a value of each recording's own
     assert command(("slack", {"width": 0.01})) == ""
+    assert command(("slack", {"gap": 0.01}), known=["gravity"]) == ""  # the base holds more than an energy
+
+
+def test_the_recordings_chosen_are_chosen_again():
+    assert command(("slack", {"gap": 0.01}), only=["r"]).endswith("--effect slack --only r --holdout r2")

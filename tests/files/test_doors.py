@@ -1,5 +1,6 @@
 """Bad input at the command line: one sentence, exit code 2, nothing lost; and what must be read is read."""
 
+import builtins
 import json
 from pathlib import Path
 
@@ -89,19 +90,22 @@ def test_what_the_system_refuses_when_writing(error, words, tmp_path, monkeypatc
     assert not list((tmp_path / "o").glob("*")), "half a file was left"
 
 
-def test_what_the_system_refuses_when_reading(tmp_path, monkeypatch, capsys):
-    import builtins
-
-    file = tmp_path / "a.h5"
-    file.write_bytes(b"x")
+def refuse_to_open(file, error, monkeypatch):
+    """Make the system answer the opening of one file with an error."""
     real = builtins.open
 
     def refuse(path, *rest, **named):
         if str(path) == str(file):
-            raise PermissionError(13, "Permission denied", str(file))
+            raise error
         return real(path, *rest, **named)
 
     monkeypatch.setattr(builtins, "open", refuse)
+
+
+def test_what_the_system_refuses_when_reading(tmp_path, monkeypatch, capsys):
+    file = tmp_path / "a.h5"
+    file.write_bytes(b"x")
+    refuse_to_open(file, PermissionError(13, "Permission denied", str(file)), monkeypatch)
     assert main(["inspect", str(file)]) == 2
     assert "Permission denied" in capsys.readouterr().err
 
@@ -258,18 +262,9 @@ def test_a_name_too_long_is_said_shortly(verb, capsys):
 
 
 def test_a_file_that_can_not_be_read_is_not_called_empty(tmp_path, monkeypatch, capsys):
-    import builtins
-
     file = tmp_path / "mem.csv"
     file.touch()
-    real = builtins.open
-
-    def refuse(path, *rest, **named):
-        if str(path) == str(file):
-            raise OSError(5, "Input/output error", str(file))
-        return real(path, *rest, **named)
-
-    monkeypatch.setattr(builtins, "open", refuse)
+    refuse_to_open(file, OSError(5, "Input/output error", str(file)), monkeypatch)
     assert main(["import", str(file)]) == 2
     assert "can't be read (Input/output error)" in capsys.readouterr().err
 

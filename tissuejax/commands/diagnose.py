@@ -1,7 +1,6 @@
 """`tissuejax diagnose`: what is missing in the model of a recording, where, and how sure."""
 
 import argparse
-import re
 import shlex
 from pathlib import Path
 from typing import ClassVar
@@ -9,7 +8,7 @@ from typing import ClassVar
 import equinox as eqx
 
 from tissuejax.commands.command import Command, Reply
-from tissuejax.commands.outputs import add_out, folder
+from tissuejax.commands.outputs import add_out, effects_of, folder
 from tissuejax.diagnosis.diagnose import diagnose
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.effects.catalogue import effect, effects
@@ -110,8 +109,7 @@ def _fit_with(found: Diagnosis, sample: Sample, given: argparse.Namespace) -> st
     options: list[str] = []
     for one in found.as_dict()["effects"] if found.verdict.chosen else ():
         name, values = one["name"], {p.rpartition(".")[2]: v["value"] for p, v in one["parameters"].items()}
-        terms = sum(bool(re.fullmatch(r"g\d", p)) for p in values)
-        typed = f"{name}-{terms}" if terms > 1 else name
+        typed = effects_of({"effects": [name], "parameters": one["parameters"]})[0]
         if name not in effects() or any(p.rpartition(".")[0] != f"effects.{name}" for p in one["parameters"]):
             return ""
         known = {d.name: d for d in effect(typed).parameters}
@@ -122,8 +120,9 @@ def _fit_with(found: Diagnosis, sample: Sample, given: argparse.Namespace) -> st
             if known[p].frozen and v != known[p].default:
                 options += ["--fix", f"effects.{name}.{p}={v:.6g}"]
     kinds = {experiment(r.experiment).kind for r in sample.recordings.values()}
-    if not options or "cutting" in kinds:
+    if not options or "cutting" in kinds or given.known:  # what is known has no option of `fit`
         return ""
+    options += [x for name in given.only for x in ("--only", name)]
     held = [x for name in found.as_dict()["held_out"] for x in ("--holdout", name)]
     form = ["--ogden-form", given.ogden_form] if given.ogden_form else []
     return shlex.join(["tissuejax", "fit", str(given.file), "--energy", given.energy, *form, *options, *held])

@@ -118,7 +118,8 @@ def fit_cut(
     starts = _starts(values, dict(start or {}), known, thickness)
     made = predictor(plain, seen, names, settings=settings, start=starts[0], **options)
     with (progress or Silent()).stage(f"cutting {', '.join(names)}", None) as stage:
-        mark = mark_of(posed_at(made, free, starts[0], {}), settings, made.paths_of, max_steps)
+        asked = settings, made.paths_of, max_steps, sample.density, dict(start or {})
+        mark = mark_of(posed_at(made, free, starts[0], {}), *asked)
         search = Search(free, max_steps, Checkpoint(checkpoint, mark, starts[0]), stage)
         best = search.best(made, starts)
         posed = best.posed
