@@ -21,7 +21,7 @@ from tissuejax.energies.energy import Energy
 from tissuejax.errors import UnstableSimulation
 from tissuejax.experiments.catalogue import experiment
 from tissuejax.experiments.predictor import predictor
-from tissuejax.experiments.probing_slips import all_slips
+from tissuejax.experiments.probing_slips import all_slips, warned
 from tissuejax.families import lookup, members
 from tissuejax.fitting import kinds
 from tissuejax.fitting.kinds.fitted import Fitted
@@ -128,8 +128,7 @@ def fit(
         found = kind.fit(posed, held, search, frozenset(start or ()), progress)
     except UnstableSimulation as error:
         raise UnstableSimulation(f"{error}{'. First look at the data: ' if said else ''}{'; '.join(said)}") from error
-    for sentence in said:
-        found.warnings.append(f"Look at the data: {sentence}" + ("" if sentence.endswith("?") else "."))
+    found.warnings.extend(warned(said))
     return found if begun is None else replace(found, first=begun)
 
 

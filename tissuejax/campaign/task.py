@@ -12,7 +12,7 @@ from typing import Any
 from tissuejax.cache.key import key
 from tissuejax.errors import InputError, TissueError, unknown
 from tissuejax.recordings.files import names, read, reader
-from tissuejax.recordings.plausible import refuse_unusable, slips
+from tissuejax.recordings.plausible import refuse_unusable
 from tissuejax.recordings.recording import Sample
 
 KINDS = ("fit", "diagnose")
@@ -198,6 +198,7 @@ def _solved(task: Task) -> dict[str, Any]:
     from tissuejax.effects.catalogue import effect
     from tissuejax.energies import catalogue
     from tissuejax.experiments.predictor import predictor
+    from tissuejax.experiments.probing_slips import all_slips, warned
     from tissuejax.fitting.advice import suspicions
     from tissuejax.fitting.least_squares import fit
     from tissuejax.fitting.options import Objective, Search, Unknowns
@@ -219,7 +220,7 @@ def _solved(task: Task) -> dict[str, Any]:
     start = {path: posed.start[path] for path in unknowns.start or ()} or None
     search = replace(search, multistart=s.multistart, seed=s.seed)
     found = fit(posed, start=start, search=search, holdout=held)
-    found.warnings.extend(f"Look at the data: {sentence}." for sentence in slips(sample, (*fitted, *held)))
+    found.warnings.extend(warned(all_slips(sample, (*fitted, *held))))
     doubts = {} if found.converged else {"not converged": [f"the search did not converge: {found.status}"]}
     record = {name: value for name, value in found.record().items() if name not in UNSTORED}
     return record | {"suspect": doubts | suspicions(found)}

@@ -46,6 +46,11 @@ def all_slips(sample: Sample, names: Iterable[str] | None = None) -> list[str]:
     return [*slips(sample, names), *probing_slips(sample, names)]
 
 
+def warned(slips_said: Iterable[str]) -> list[str]:
+    """Slips as warnings of a fit."""
+    return [f"Look at the data: {said}" + ("" if said.endswith("?") else ".") for said in slips_said]
+
+
 def _body(sample: Sample) -> list[str]:
     size = float(np.ptp(sample.geometry.points, axis=0).max())
     if size > LARGEST:
