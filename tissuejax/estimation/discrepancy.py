@@ -13,6 +13,7 @@ the model of Kennedy and O'Hagan (2001), with the parts that rests of material t
 | slow | exponential in time (0.05, 0.25 and 1.5 of the recording), of each recording's own |
 | waning gain | the stress times exponential in time (0.5 of the recording): stiffness that comes and goes, or is lost |
 | white | what scatters from sample to sample beyond the stated noise |
+| effects | what an effect does, times squared exponential (0.5) in strain and log time, and times a gain of its own |
 | sudden | what happens at once, where a judgement has found that something may have (`estimation.sudden`) |
 
 Amplitudes a_k are shares of the stress that the model predicts (law, gain, waning gain), of its peak in the recording
@@ -35,6 +36,7 @@ LAW = {"law": 0.5, "fine law": 0.12}  # correlation lengths, of the range of str
 ALIKE = 0.4  # correlation length of hysteresis, of the range of strain
 STATES = {"step": 0.01, "narrow": 0.06, "wide": 0.3}  # path over which the loading state turns, of the range
 SLOW = {"quick": 0.05, "slow": 0.25, "lasting": 1.5}  # correlation times, of a recording's duration
+BEGUN = 0.01  # of a recording's duration: up to there time is counted, beyond it its logarithm
 WANING = 0.5  # correlation time of a gain, of a recording's duration
 LEFT_OUT = 1e-5  # of the largest eigenvalue: what smooth parts are cut off at
 BAND = 0.005  # of the range: a drive that trembles by less has not turned round
@@ -110,6 +112,12 @@ def smooth_factor(x: Float[np.ndarray, "n k"], length: float) -> Float[np.ndarra
     return vectors[:, kept] * np.sqrt(values[kept])
 
 
+def _passed(time: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Time since the first sample on a scale of its logarithm, from 0 to 1."""
+    elapsed = (time - time[0]) / (float(np.ptp(time)) or 1.0)
+    return np.log1p(elapsed / BEGUN) / np.log1p(1 / BEGUN)
+
+
 @dataclass(frozen=True)
 class Discrepancy:
     """All parts of the discrepancy of some series; laws and gains scale with what a model predicts.
@@ -121,6 +129,8 @@ class Discrepancy:
         turning: factors of hysteresis about a peak of one, by name.
         fixed: the parts that don't depend on the prediction.
         fading: of a gain that changes in time, by series, how alike two samples are; none where time says nothing.
+        nearly: factors of what the law of an effect errs by, about a change of the stress of one: smooth in strain and
+            the logarithm of time, shared by the series of a mode, and a gain of each recording's own.
         timed: when each row was measured; None where what happens at once is not looked for.
         sudden: what may have happened at once.
     """
@@ -131,11 +141,18 @@ class Discrepancy:
     turning: tuple[tuple[str, Float[np.ndarray, "N r"]], ...]
     fixed: tuple[Part, ...]
     fading: tuple[Float[np.ndarray, "n n"], ...]
+    nearly: Float[np.ndarray, "N e"]
     timed: Timed | None = None
     sudden: tuple[Moment, ...] = ()
 
-    def about(self, prediction: Float[np.ndarray, " N"]) -> tuple[Part, ...]:
-        """The parts beside this prediction, Pa; always in the same order."""
+    def about(
+        self, prediction: Float[np.ndarray, " N"], done: Sequence[Float[np.ndarray, " N"]] = ()
+    ) -> tuple[Part, ...]:
+        """The parts beside this prediction, Pa; always in the same order.
+
+        Args:
+            done: what each effect in it does: the prediction less the one without that effect, Pa.
+        """
         stress = prediction[:, None]
         laws = tuple(Part(name, "law", stress * factor) for name, factor in self.laws)
         several = (Part("gain", "gain", stress * self.belongs), Part("own law", "gain", stress * self.own))
@@ -147,10 +164,12 @@ class Discrepancy:
             for alike, a, b in zip(self.fading, edges, edges[1:], strict=False)
         )
         changing = (Part("waning gain", "slow", within=waning),) if waning else ()
+        errs = [d[:, None] * self.nearly for d in done] or [np.zeros((len(prediction), 1))]
+        effects = Part("effects", "effect", np.concatenate(errs, axis=1))
         timed = self.timed
         moments = self.sudden if timed is not None else ()
         once = tuple(Part(s.name, "sudden", s.factor(prediction, timed)) for s in moments if timed is not None)
-        return (*laws, *several, *turning, *self.fixed, *changing, *once)
+        return (*laws, *several, *turning, *self.fixed, effects, *changing, *once)
 
 
 def discrepancy(
@@ -161,18 +180,23 @@ def discrepancy(
     Args:
         sigma: noise of each entry, Pa; entries that are means of more samples scatter less.
         paced: whether time is more than a function of the strain: else a gain that wanes is a law of each recording's
-            own, and that part is left out.
+            own, and that part is left out, and what an effect's law errs by is smooth in strain alone.
         at_once: whether what happens at once is looked for.
     """
     of = np.repeat(np.arange(len(series)), [len(s.time) for s in series])
     states = np.concatenate([s.states for s in series])
 
-    def shared(length: float, labels: Sequence[Hashable]) -> Float[np.ndarray, "N r"]:
-        """Factors side by side, of the series of each label: smooth in strain, one function for all of them."""
+    def shared(length: float, labels: Sequence[Hashable], timed: bool = False) -> Float[np.ndarray, "N r"]:
+        """Factors side by side, of the series of each label: smooth in strain, or in it and in the logarithm of time,
+        one function for all of them."""
         columns = []
         for label in dict.fromkeys(labels):
             members = np.array([i for i, other in enumerate(labels) if other == label])
-            own = smooth_factor(np.concatenate([series[i].strain for i in members]), length)
+            x = np.concatenate([series[i].strain for i in members])
+            if timed:
+                passed = np.concatenate([_passed(series[i].time) for i in members])
+                x = np.column_stack([x / (float(np.max(np.ptp(x, axis=0))) or 1.0), passed])
+            own = smooth_factor(x, length)
             whole = np.zeros((len(of), own.shape[1]))
             whole[np.isin(of, members)] = own
             columns.append(whole)
@@ -195,6 +219,7 @@ def discrepancy(
     out.append(Part("white", "white", within=tuple(scatter)))
     laws = tuple((name, shared(length, modes)) for name, length in LAW.items())
     own = shared(LAW["law"], [(s.recording, s.mode) for s in series])
+    near = shared(LAW["law"], modes, timed=paced)
     belongs_to = (belongs[:, None] == np.arange(len(recordings))).astype(float)
     return Discrepancy(
         laws,
@@ -203,5 +228,6 @@ def discrepancy(
         turning,
         tuple(out),
         tuple(np.exp(-d / WANING) for d in apart if paced),
+        np.concatenate([near, belongs_to], axis=1),
         Timed(np.concatenate([s.time for s in series]), of, np.argmax(belongs_to, axis=1)) if at_once else None,
     )

@@ -126,9 +126,15 @@ def sure(d: Diagnosis) -> list[str]:
         out.append(
             f"Of what has a name, beyond its parameters (typical amplitudes, shares of the stress): {'; '.join(own)}."
         )
-    large = [f"{_part(k)} {100 * v:.2g} %" for k, v in rest["parts"].items() if v > 1e-3 and k not in ("mesh", "speed")]
+    apart = ("mesh", "speed", "effects")
+    large = [f"{_part(k)} {100 * v:.2g} %" for k, v in rest["parts"].items() if v > 1e-3 and k not in apart]
     if large:
         out.append(f"What is left, by kind, as shares of the stress (typical amplitudes): {'; '.join(large)}.")
+    if (errs := rest["parts"].get("effects", 0.0)) > 1e-3:
+        out.append(
+            f"The law of what is named is only nearly right here: it errs by {100 * errs:.2g} % of what it does "
+            "(typical amplitude)."
+        )
     if j.chosen.numerical:
         out.append(
             f"To mesh and step of the simulation {100 * j.chosen.numerical:.2g} % of the largest values are laid, and "

@@ -61,12 +61,12 @@ class Criteria:
     counted: int = 400
     shares: Mapping[str, float] = field(
         default_factory=lambda: (
-            {"law": 0.015, "gain": 0.015, "hysteresis": 0.01, "slow": 0.01, "white": 0.005}
+            {"law": 0.015, "gain": 0.015, "hysteresis": 0.01, "slow": 0.01, "white": 0.005, "effect": 0.05}
             | {"marker": 0.02, "onset": 0.01, "peak": 0.05, "numerical": 1.0, "sudden": 1e-4}
         )
     )
     strange: float = 10.0
-    settled: frozenset[str] = frozenset({"peak"})
+    settled: frozenset[str] = frozenset({"peak", "effect"})
     sudden: float = 0.1
     change: float = 0.3
     rig: float = 0.1

@@ -4,6 +4,7 @@ import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from jaxtyping import Float
@@ -43,12 +44,36 @@ class Scales:
     size: Float[np.ndarray, " M"] | None = None
     moments: int = 0
 
-    def about(self, prediction: Float[np.ndarray, " N"], bench: Bench) -> tuple[Part, ...]:
-        """The discrepancy's parts beside a prediction (a long vector), and what the simulation has wrong there."""
-        parts = self.discrepancy.about(np.nan_to_num(self.cut.mean(prediction)))
+    def about(
+        self,
+        prediction: Float[np.ndarray, " N"],
+        bench: Bench,
+        keys: Sequence[str] = (),
+        values: Mapping[str, float] = MappingProxyType({}),
+    ) -> tuple[Part, ...]:
+        """The discrepancy's parts beside a prediction (a long vector), and what the simulation has wrong there.
+
+        Args:
+            keys: effects in the prediction, at `values`; what their laws err by is a part where that is known.
+        """
+        here = np.nan_to_num(self.cut.mean(prediction))
+        done = self._done(here, bench, keys, values) if "effect" in self.families else []
+        parts = self.discrepancy.about(here, done) if done else self.discrepancy.about(here)
         if bench.numerical is None:
             return parts
         return (*parts, *(self._known(name, self.cut.mean(x)) for name, x in bench.numerical.items()))
+
+    def _done(
+        self, here: Float[np.ndarray, " M"], bench: Bench, keys: Sequence[str], values: Mapping[str, float]
+    ) -> list[Float[np.ndarray, " M"]]:
+        """What each effect does that has an amplitude: the prediction less the one with its amplitudes at neutral."""
+        out = []
+        for key in keys:
+            neutral = {a: bench.start[a] for a in bench.candidates[key].amplitudes if a in values}
+            if neutral:
+                without = self.cut.mean(bench.predict({**values, **neutral}))
+                out.append(np.nan_to_num(here - without))
+        return out
 
     def _known(self, name: str, error: Float[np.ndarray, "M ..."]) -> Part:
         """A known error of a simulation: by columns, or where its sign is not known of each block alone."""

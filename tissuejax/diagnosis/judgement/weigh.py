@@ -129,7 +129,7 @@ def weigh(
     y, best = scales.cut.mean(bench.y), None
     at, tolerance, raw = dict(at or start), 0.5, None
     bench = bench.anchored(at) if anchor else bench.nearer(at)
-    parts = scales.about(bench.predict(at), bench)
+    parts = scales.about(bench.predict(at), bench, keys, at)
     for _turn in range(rounds):
         misfit = Whitening(bench, scales.cut, scales.blocked, parts, v)
         seed = None if raw is None or bench.costly else misfit.whiten_means(raw)
@@ -150,7 +150,7 @@ def weigh(
         jac = raw * np.where(descent.log, [fit.values[p] for p in descent.paths], 1.0)
         if not np.isfinite(squared(jac / scales.blocked.sigma[:, None])):
             break  # a prediction without a slope, or with one beyond all numbers: no density is to be had there
-        residual, parts = y - scales.cut.mean(fit.prediction), scales.about(fit.prediction, bench)
+        residual, parts = y - scales.cut.mean(fit.prediction), scales.about(fit.prediction, bench, keys, fit.values)
         prior = [priors.get(p) for p in descent.paths]
         weak = np.array([0.0 if p is None else p[1] ** -2 for p in prior])
         offset = np.array([0.0 if p is None else a - p[0] for a, p in zip(x, prior, strict=True)])
@@ -206,8 +206,11 @@ def _anchored(bench: Bench, fit: Refit, start: Mapping[str, float]) -> tuple[Ben
 
 
 def _amplitudes(linear, parts, widths: Widths, blocked, v, anew: bool, both: bool) -> tuple[np.ndarray, Marginal]:
-    """`amplitudes` from `v`; anew also from where all is wide that may be: alone, or beside that from `v`."""
-    tried = []
+    """`amplitudes` from `v`; anew also from where all is wide that may be: alone, or beside that from `v`.
+
+    A part that is empty, as that of effects is where none acts, stays at nothing.
+    """
+    v, tried = np.where([p.factor is None or np.any(p.factor) for p in parts], v, 0.0), []
     if anew:
         wide = amplitudes(linear, parts, widths.widest, blocked, v, tolerance=SETTLED)[0]
         tried.append(amplitudes(linear, parts, widths, blocked, wide))

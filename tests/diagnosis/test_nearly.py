@@ -1,0 +1,94 @@
+"""No effect's law is more than nearly right: what it errs by is a share of what it does, and needs no second name."""
+
+import numpy as np
+
+import tissuejax as tj
+from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, marginal
+from tissuejax.diagnosis.judgement.mass import amplitude_mass
+from tissuejax.estimation.discrepancy import Series, discrepancy
+from tissuejax.recordings.recording import Channel, Recording, Sample
+
+TIME = np.linspace(0, 20, 40)
+STRAIN = np.interp(TIME, [0, 5, 20], [0, 0.3, 0.3])
+
+
+def two(paced: bool):
+    """The discrepancy of two recordings of one strain path, and what an effect does to them."""
+    series = [Series(n, "pull", TIME, STRAIN[:, None], np.zeros((40, 3)), 100.0) for n in ("a", "b")]
+    done = np.concatenate([30 * STRAIN, 60 * STRAIN])
+    return discrepancy(series, np.ones(80), paced), done
+
+
+def test_what_a_law_errs_by_is_smooth_in_strain_and_log_time_and_has_a_gain_of_each_recording():
+    """Against the kernel written out: strain and log time over their ranges, correlation length 0.5."""
+    of, done = two(paced=True)
+    (part,) = (p for p in of.about(300 * np.tile(STRAIN, 2), [done]) if p.family == "effect")
+    x = np.tile(STRAIN / 0.3, 2)
+    passed = np.tile(np.log(1 + 100 * TIME / 20) / np.log(101), 2)
+    apart = (x[:, None] - x) ** 2 + (passed[:, None] - passed) ** 2
+    own = np.repeat([0, 1], 40)
+    kernel = np.exp(-0.5 * apart / 0.5**2) + (own[:, None] == own)
+    np.testing.assert_allclose(
+        part.factor @ part.factor.T, np.outer(done, done) * kernel, atol=2e-4 * np.max(done) ** 2
+    )
+
+
+def test_where_time_is_strain_it_is_smooth_in_strain_alone():
+    of, done = two(paced=False)
+    (part,) = (p for p in of.about(300 * np.tile(STRAIN, 2), [done]) if p.family == "effect")
+    held = np.flatnonzero(TIME >= 5)  # one strain at many times: what it errs by is one share
+    share = part.factor[held] / done[held][:, None]
+    np.testing.assert_allclose(share, np.broadcast_to(share[0], share.shape), rtol=1e-9)
+
+
+def test_where_nothing_acts_it_changes_neither_the_evidence_nor_its_mass(rng):
+    of, _ = two(paced=True)
+    stress = 300 * np.tile(STRAIN, 2)
+    parts = of.about(stress)
+    kept = [p.family != "effect" for p in parts]
+    less = [p for p, k in zip(parts, kept, strict=True) if k]
+    linear = Linear(rng.standard_normal(80), stress[:, None], np.zeros(1), np.zeros(1))
+    blocked = Blocked((slice(0, 40), slice(40, 80)), np.ones(80))
+    v = np.full(len(parts), 0.01**2)
+    widths = Widths(np.full(len(parts), 0.05), np.zeros(len(parts)))
+    narrower = Widths(widths.width[kept], widths.chance[kept])
+    m, same = marginal(linear, parts, v, blocked), marginal(linear, less, v[kept], blocked)
+    np.testing.assert_allclose(m.value, same.value, rtol=1e-12)
+    mass = amplitude_mass(linear, parts, widths, blocked, np.where(kept, v, 0.0), m)
+    assert abs(mass - amplitude_mass(linear, less, narrower, blocked, v[kept], same)) < 1e-3
+
+
+def relaxing(share: float, top: float, speed: float, rng) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Time, stretch and nominal stress of a ramp and a hold: a reduced polynomial that relaxes by a power of time.
+
+    P(t) = int G(t - s) dP_e(s), G(t) = 1 - share (1 - (1 + t / 0.3 s)^-0.3): quasi-linear, and no Prony series.
+    """
+
+    def stretch(t):
+        return 1 + np.minimum(speed * t, top)
+
+    def elastic(t):
+        x = stretch(t)
+        return 2 * (600 + 800 * (x**2 + 2 / x - 3)) * (x - x**-2)
+
+    reached = top / speed
+    time = np.concatenate([np.linspace(0, reached, 30, endpoint=False), reached + np.geomspace(0.02, 60, 60)])
+    fine = np.linspace(0, time[-1], 6001)
+    steps, middle = np.diff(elastic(fine)), 0.5 * (fine[1:] + fine[:-1])
+    since = np.maximum(time[:, None] - middle, 0.0)
+    weight = np.where(time[:, None] > middle, 1 - share * (1 - (1 + since / 0.3) ** -0.3), 0.0)
+    return time, stretch(time), weight @ steps + rng.normal(0, 3.0, len(time))
+
+
+def test_specimens_that_relax_by_shares_of_their_own_and_by_no_series_are_named_for_relaxation_alone():
+    """Four specimens lose 70 to 90 % of what can relax, by a power law. Before this part came in, another law of the
+    energy was named beside the relaxation, with 0.99, and the energy is exactly the base's."""
+    rng, recordings = np.random.default_rng(0), {}
+    for k, (share, top, speed) in enumerate([(0.8, 0.15, 0.3), (0.7, 0.25, 0.3), (0.9, 0.25, 0.03), (0.75, 0.2, 0.1)]):
+        time, stretch, stress = relaxing(share, top, speed, rng)
+        channels = {"nominal_stress": Channel(time, stress, "Pa", 3.0)}
+        recordings[f"s{k}"] = Recording(f"s{k}", "uniaxial", {"time": time, "stretch": stretch}, channels)
+    found = tj.diagnose(Sample("relaxing", recordings), "reduced-polynomial-2")
+    assert [e["name"] for e in found.as_dict()["effects"]] == ["viscoelasticity"]
+    assert found.answered.judgement.inclusion["viscoelasticity"] > 0.95
+    assert found.answered.rest()["parts"]["effects"] > 0.01
