@@ -92,3 +92,12 @@ def test_specimens_that_relax_by_shares_of_their_own_and_by_no_series_are_named_
     assert [e["name"] for e in found.as_dict()["effects"]] == ["viscoelasticity"]
     assert found.answered.judgement.inclusion["viscoelasticity"] > 0.95
     assert found.answered.rest()["parts"]["effects"] > 0.01
+
+
+def test_a_recording_that_is_alone_in_its_mode_has_no_second_law():
+    """Its own law would be that of the mode once more: one rest shared by two amplitudes has no evidence of its own."""
+    alone = [Series(n, n, TIME, STRAIN[:, None], np.zeros((40, 3)), 100.0) for n in ("a", "b")]
+    (own,) = (p for p in discrepancy(alone, np.ones(80)).about(np.ones(80)) if p.name == "own law")
+    assert not np.any(own.factor)
+    (own,) = (p for p in two(paced=False)[0].about(np.ones(80)) if p.name == "own law")
+    assert np.all(np.any(own.factor[:40], axis=1))

@@ -8,7 +8,7 @@ the model of Kennedy and O'Hagan (2001), with the parts that rests of material t
 |---|---|
 | law | squared exponential in strain (0.5 and 0.12 of the range) times the stress, shared by the series of a mode |
 | gain | constant times the stress, of each recording's own (specimens differ in stiffness, load cells in gain) |
-| own law | squared exponential in strain (0.5) times the stress, of each recording's own (specimens differ in form) |
+| own law | squared exponential in strain (0.5) times the stress, of a recording's own where several share a law |
 | hysteresis | squared exponential in strain (0.4) times a loading state, in three shapes, shared by a mode |
 | slow | exponential in time (0.05, 0.25 and 1.5 of the recording), of each recording's own |
 | waning gain | the stress times exponential in time (0.5 of the recording): stiffness that comes and goes, or is lost |
@@ -125,7 +125,8 @@ class Discrepancy:
     Attributes:
         laws: factors of the laws about a stress of one, by name.
         belongs: a column for every recording, one where a row belongs to it.
-        own: factors of a law of each recording's own, about a stress of one; its series of a mode share it.
+        own: factors of a law of each recording's own, about a stress of one; its series of a mode share it. None of a
+            recording that is alone in its mode: the law of that mode is its own.
         turning: factors of hysteresis about a peak of one, by name.
         fixed: the parts that don't depend on the prediction.
         fading: of a gain that changes in time, by series, how alike two samples are; none where time says nothing.
@@ -188,9 +189,9 @@ def discrepancy(
 
     def shared(length: float, labels: Sequence[Hashable], timed: bool = False) -> Float[np.ndarray, "N r"]:
         """Factors side by side, of the series of each label: smooth in strain, or in it and in the logarithm of time,
-        one function for all of them."""
-        columns = []
-        for label in dict.fromkeys(labels):
+        one function for all of them; none where there is no label."""
+        columns = [np.zeros((len(of), 0 if any(label is not None for label in labels) else 1))]
+        for label in dict.fromkeys(label for label in labels if label is not None):
             members = np.array([i for i, other in enumerate(labels) if other == label])
             x = np.concatenate([series[i].strain for i in members])
             if timed:
@@ -218,7 +219,8 @@ def discrepancy(
         scatter.append(np.diag((s.peak * own / max(float(np.median(own)), 1e-300)) ** 2))
     out.append(Part("white", "white", within=tuple(scatter)))
     laws = tuple((name, shared(length, modes)) for name, length in LAW.items())
-    own = shared(LAW["law"], [(s.recording, s.mode) for s in series])
+    several = {m for m in modes if len({s.recording for s in series if s.mode == m}) > 1}
+    own = shared(LAW["law"], [(s.recording, s.mode) if s.mode in several else None for s in series])
     near = shared(LAW["law"], modes, timed=paced)
     belongs_to = (belongs[:, None] == np.arange(len(recordings))).astype(float)
     return Discrepancy(
