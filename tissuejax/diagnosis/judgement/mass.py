@@ -39,7 +39,7 @@ def amplitude_mass(
             change = _within(linear, parts, priors, blocked, v, m, k)(a**2)
         density = priors.part(k).log_density((a**2)[:, None])[:, 0]
         total += float(logsumexp(change + density + np.log(a))) + math.log(math.log(grid[1] / grid[0]))
-    moving = np.flatnonzero(v > MOVED * priors.width**2)
+    moving = np.flatnonzero((v > MOVED * priors.width**2) & (np.diag(m.fisher) > 0))  # an empty part says nothing
     if len(moving) > 1:
         f = m.fisher[np.ix_(moving, moving)]
         scale = 1 / np.sqrt(np.diag(f))

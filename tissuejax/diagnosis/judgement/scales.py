@@ -66,11 +66,14 @@ class Scales:
     def _done(
         self, here: Float[np.ndarray, " M"], bench: Bench, keys: Sequence[str], values: Mapping[str, float]
     ) -> list[Float[np.ndarray, " M"]]:
-        """What each effect does that has an amplitude: the prediction less the one with its amplitudes at neutral."""
+        """What each effect of the tissue does: the prediction less the one with its amplitudes at neutral.
+
+        A fault of the rig is exactly what it is called: an offset, a lag, a hum of one frequency.
+        """
         out = []
-        for key in keys:
-            neutral = {a: bench.start[a] for a in bench.candidates[key].amplitudes if a in values}
-            if neutral:
+        for candidate in (bench.candidates[k] for k in keys):
+            neutral = {a: bench.start[a] for a in candidate.amplitudes if a in values}
+            if neutral and not candidate.rig:
                 without = self.cut.mean(bench.predict({**values, **neutral}))
                 out.append(np.nan_to_num(here - without))
         return out
