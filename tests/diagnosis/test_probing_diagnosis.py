@@ -11,6 +11,7 @@ from tissuejax.diagnosis.probing_discrepancy import probing_discrepancy
 from tissuejax.diagnosis.probing_view import ProbingView, probing_blocks
 from tissuejax.energies.catalogue import energy
 from tissuejax.recordings.recording import Sample
+from tissuejax.report.judged_sentences import PARTS
 
 SETTINGS = {"mesh": "file", "compression": 3.0, "interval": 0.04, "step": 8e-4, "processes": 1}
 NAMES = ["contact-offset", "force-drift"]
@@ -45,6 +46,8 @@ def test_a_probing_is_diagnosed_for_few_simulations(more, names):
     assert found.judgement.names == names
     assert found.simulations < 250
     assert sum(found.judgement.probabilities.values()) == pytest.approx(1.0)
+    parts = {p.name.partition(" of ")[0] for w in found.exploration.weighed.values() for p in w.parts}
+    assert {"law", "marker", "mesh", "speed", "ringing"} <= parts <= set(PARTS)  # the page has words for each
     assert found.chosen.values["energy.C10"] == pytest.approx(VALUES["energy.C10"], rel=0.2)
     for path, std in found.chosen.std.items():
         true = (VALUES | more).get(path)

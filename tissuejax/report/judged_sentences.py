@@ -23,6 +23,8 @@ PARTS = {
     "numerical": "what mesh and step of the simulation leave open",
     "mesh": "what the mesh of the simulation leaves open",
     "speed": "what the speed of the simulation leaves open",
+    "ringing": "what rings in the simulation where the probe starts or stops",
+    "effects": "what the law of what is named errs by",
     "crosstalk": "vertical force in the lateral ones",
     "onset": "where the surface is met",
     "peak": "a peak where the blade's shoulder enters",
@@ -126,7 +128,7 @@ def sure(d: Diagnosis) -> list[str]:
         out.append(
             f"Of what has a name, beyond its parameters (typical amplitudes, shares of the stress): {'; '.join(own)}."
         )
-    apart = ("mesh", "speed", "effects")
+    apart = ("mesh", "speed", "ringing", "effects")
     large = [f"{_part(k)} {100 * v:.2g} %" for k, v in rest["parts"].items() if v > 1e-3 and k not in apart]
     if large:
         out.append(f"What is left, by kind, as shares of the stress (typical amplitudes): {'; '.join(large)}.")
