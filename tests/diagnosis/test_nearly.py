@@ -1,11 +1,12 @@
 """No effect's law is more than nearly right: what it errs by is a share of what it does, and needs no second name."""
 
 import numpy as np
+import pytest
 
 import tissuejax as tj
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, marginal
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
-from tissuejax.estimation.discrepancy import Series, discrepancy
+from tissuejax.estimation.discrepancy import Done, Series, discrepancy
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 TIME = np.linspace(0, 20, 40)
@@ -22,7 +23,7 @@ def two(paced: bool):
 def test_what_a_law_errs_by_is_smooth_in_strain_and_log_time_and_has_a_gain_of_each_recording():
     """Against the kernel written out: strain and log time over their ranges, correlation length 0.5."""
     of, done = two(paced=True)
-    (part,) = (p for p in of.about(300 * np.tile(STRAIN, 2), [done]) if p.family == "effect")
+    (part,) = (p for p in of.about(300 * np.tile(STRAIN, 2), [Done(done, True)]) if p.family == "effect")
     x = np.tile(STRAIN / 0.3, 2)
     passed = np.tile(np.log(1 + 100 * TIME / 20) / np.log(101), 2)
     apart = (x[:, None] - x) ** 2 + (passed[:, None] - passed) ** 2
@@ -33,9 +34,10 @@ def test_what_a_law_errs_by_is_smooth_in_strain_and_log_time_and_has_a_gain_of_e
     )
 
 
-def test_where_time_is_strain_it_is_smooth_in_strain_alone():
-    of, done = two(paced=False)
-    (part,) = (p for p in of.about(300 * np.tile(STRAIN, 2), [done]) if p.family == "effect")
+@pytest.mark.parametrize(("paced", "timed"), [(False, True), (True, False)])
+def test_where_time_is_strain_or_the_law_knows_no_time_it_is_smooth_in_strain_alone(paced, timed):
+    of, done = two(paced)
+    (part,) = (p for p in of.about(300 * np.tile(STRAIN, 2), [Done(done, timed)]) if p.family == "effect")
     held = np.flatnonzero(TIME >= 5)  # one strain at many times: what it errs by is one share
     share = part.factor[held] / done[held][:, None]
     np.testing.assert_allclose(share, np.broadcast_to(share[0], share.shape), rtol=1e-9)

@@ -13,7 +13,7 @@ the model of Kennedy and O'Hagan (2001), with the parts that rests of material t
 | slow | exponential in time (0.05, 0.25 and 1.5 of the recording), of each recording's own |
 | waning gain | the stress times exponential in time (0.5 of the recording): stiffness that comes and goes, or is lost |
 | white | what scatters from sample to sample beyond the stated noise |
-| effects | what an effect does, times squared exponential (0.5) in strain and log time, and times a gain of its own |
+| effects | squared exponential (0.5) in strain, and in log time if its law knows time, times what an effect does |
 | sudden | what happens at once, where a judgement has found that something may have (`estimation.sudden`) |
 
 Amplitudes a_k are shares of the stress that the model predicts (law, gain, waning gain), of its peak in the recording
@@ -119,6 +119,14 @@ def _passed(time: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
 
 
 @dataclass(frozen=True)
+class Done:
+    """What an effect does: the prediction less the one without it, Pa; whether its law knows times or rates."""
+
+    change: Float[np.ndarray, " N"]
+    timed: bool
+
+
+@dataclass(frozen=True)
 class Discrepancy:
     """All parts of the discrepancy of some series; laws and gains scale with what a model predicts.
 
@@ -130,8 +138,9 @@ class Discrepancy:
         turning: factors of hysteresis about a peak of one, by name.
         fixed: the parts that don't depend on the prediction.
         fading: of a gain that changes in time, by series, how alike two samples are; none where time says nothing.
-        nearly: factors of what the law of an effect errs by, about a change of the stress of one: smooth in strain and
-            the logarithm of time, shared by the series of a mode, and a gain of each recording's own.
+        nearly: factors of what the law of an effect errs by, about a change of the stress of one: smooth in strain,
+            shared by the series of a mode, and a gain of each recording's own. in_time: the same of a law that knows
+            time, smooth in strain and in the logarithm of time.
         timed: when each row was measured; None where what happens at once is not looked for.
         sudden: what may have happened at once.
     """
@@ -143,16 +152,15 @@ class Discrepancy:
     fixed: tuple[Part, ...]
     fading: tuple[Float[np.ndarray, "n n"], ...]
     nearly: Float[np.ndarray, "N e"]
+    in_time: Float[np.ndarray, "N f"]
     timed: Timed | None = None
     sudden: tuple[Moment, ...] = ()
 
-    def about(
-        self, prediction: Float[np.ndarray, " N"], done: Sequence[Float[np.ndarray, " N"]] = ()
-    ) -> tuple[Part, ...]:
+    def about(self, prediction: Float[np.ndarray, " N"], done: Sequence[Done] = ()) -> tuple[Part, ...]:
         """The parts beside this prediction, Pa; always in the same order.
 
         Args:
-            done: what each effect in it does: the prediction less the one without that effect, Pa.
+            done: what the effects in it do.
         """
         stress = prediction[:, None]
         laws = tuple(Part(name, "law", stress * factor) for name, factor in self.laws)
@@ -165,7 +173,8 @@ class Discrepancy:
             for alike, a, b in zip(self.fading, edges, edges[1:], strict=False)
         )
         changing = (Part("waning gain", "slow", within=waning),) if waning else ()
-        errs = [d[:, None] * self.nearly for d in done] or [np.zeros((len(prediction), 1))]
+        errs = [d.change[:, None] * (self.in_time if d.timed else self.nearly) for d in done]
+        errs = errs or [np.zeros((len(prediction), 1))]
         effects = Part("effects", "effect", np.concatenate(errs, axis=1))
         timed = self.timed
         moments = self.sudden if timed is not None else ()
@@ -221,7 +230,6 @@ def discrepancy(
     laws = tuple((name, shared(length, modes)) for name, length in LAW.items())
     several = {m for m in modes if len({s.recording for s in series if s.mode == m}) > 1}
     own = shared(LAW["law"], [(s.recording, s.mode) if s.mode in several else None for s in series])
-    near = shared(LAW["law"], modes, timed=paced)
     belongs_to = (belongs[:, None] == np.arange(len(recordings))).astype(float)
     return Discrepancy(
         laws,
@@ -230,6 +238,7 @@ def discrepancy(
         turning,
         tuple(out),
         tuple(np.exp(-d / WANING) for d in apart if paced),
-        np.concatenate([near, belongs_to], axis=1),
+        np.concatenate([shared(LAW["law"], modes), belongs_to], axis=1),
+        np.concatenate([shared(LAW["law"], modes, timed=paced), belongs_to], axis=1),
         Timed(np.concatenate([s.time for s in series]), of, np.argmax(belongs_to, axis=1)) if at_once else None,
     )

@@ -14,7 +14,9 @@ from tissuejax.diagnosis.bench import Bench, Candidate, Free
 from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.marginal import Blocked, Widths
-from tissuejax.estimation.discrepancy import Discrepancy, Part
+from tissuejax.estimation.discrepancy import Discrepancy, Done, Part
+
+CLOCKED = ("s", "1/s")  # units of parameters by which a law knows time
 
 
 @dataclass
@@ -65,17 +67,19 @@ class Scales:
 
     def _done(
         self, here: Float[np.ndarray, " M"], bench: Bench, keys: Sequence[str], values: Mapping[str, float]
-    ) -> list[Float[np.ndarray, " M"]]:
+    ) -> list[Done]:
         """What each effect of the tissue does: the prediction less the one with its amplitudes at neutral.
 
-        A fault of the rig is exactly what it is called: an offset, a lag, a hum of one frequency.
+        A fault of the rig is exactly what it is called: an offset, a lag, a hum of one frequency. A law without a time
+        or a rate errs by no function of time: that is for another effect to explain.
         """
         out = []
         for candidate in (bench.candidates[k] for k in keys):
             neutral = {a: bench.start[a] for a in candidate.amplitudes if a in values}
             if neutral and not candidate.rig:
                 without = self.cut.mean(bench.predict({**values, **neutral}))
-                out.append(np.nan_to_num(here - without))
+                timed = any(bench.free[p].unit in CLOCKED for p in candidate.paths)
+                out.append(Done(np.nan_to_num(here - without), timed))
         return out
 
     def _known(self, name: str, error: Float[np.ndarray, "M ..."]) -> Part:
