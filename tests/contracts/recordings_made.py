@@ -30,7 +30,7 @@ def recording(
     attributes |= {s.path: float(rng.uniform(0.001, 1)) for s in scalars(kind) if full or not s.optional}
     if full:
         attributes["start"] = 12.5
-        attributes |= {f"{i.path}/noise_std": 0.01 for i in items if i.noise == "optional"}
+        attributes |= {f"{i.path}/noise_std": 0.01 for i in items if i.noise and i.role == "input"}
     return Recording(name, kind, times | inputs, channels, attributes)
 
 

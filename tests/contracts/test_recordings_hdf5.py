@@ -30,7 +30,7 @@ def test_written_comes_back(kind, full, tmp_path):
 @given(
     kind=st.sampled_from(KINDS),
     seed=st.integers(0, 2**31),
-    noise=st.floats(0, 1e6),
+    noise=st.none() | st.floats(0, 1e6, exclude_min=True),
     names=st.lists(st.text("abcr0129 .-µ", min_size=1).filter(lambda n: n != "."), min_size=1, max_size=4, unique=True),
 )
 def test_round_trip_keeps_everything(kind, seed, noise, names, tmp_path):
@@ -111,7 +111,8 @@ BREACHES = {
     "stretch zero": ("uniaxial", _set(f"{U}/stretch", 0, 0.0), ["stretch", "above zero"]),
     "stretch as strain": ("uniaxial", _put(f"{U}/stretch", np.linspace(-0.3, 0.3, 7)), ["-0.3", "add 1"]),
     "noise negative": ("uniaxial", _attribute(f"{U}/nominal_stress", "noise_std", -1.0), ["noise_std", "-1"]),
-    "noise missing": ("uniaxial", _attribute(f"{U}/nominal_stress", "noise_std"), ["noise_std", "nothing", "Pa"]),
+    "noise zero": ("uniaxial", _attribute(f"{U}/nominal_stress", "noise_std", 0.0), ["noise_std", "0", "Leave it out"]),
+    "stretch noise zero": ("uniaxial", _attribute(f"{U}/stretch", "noise_std", 0.0), ["stretch", "noise_std", "above"]),
     "noise text": ("uniaxial", _attribute(f"{U}/nominal_stress", "noise_std", "5 Pa"), ["noise_std", "one number"]),
     "area zero": ("uniaxial", _attribute(U, "area", 0.0), ["area", "above zero"]),
     "start nan": ("uniaxial", _attribute(U, "start", np.nan), ["start", "nan"]),
@@ -124,7 +125,7 @@ BREACHES = {
     "radius negative": ("probing", _attribute(f"{P}/probe", "radius", -0.005), ["radius", "-0.005"]),
     "position shape": ("probing", _put(f"{P}/probe/position", np.ones((7, 2))), ["probe/position", "(7, 2)", "(n, 3)"]),
     "force nan": ("probing", _set(f"{P}/force/value", (1, 2), np.nan), ["force/value", "(1, 2)"]),
-    "force noise missing": ("probing", _attribute(f"{P}/force", "noise_std"), ["/recordings/r1/force", "noise_std"]),
+    "force noise zero": ("probing", _attribute(f"{P}/force", "noise_std", 0), ["/recordings/r1/force", "noise_std"]),
     "markers inf": ("probing", _set(f"{P}/markers/position", (0, 0, 0), np.inf), ["markers/position", "inf"]),
     "markers half": ("probing", _delete(f"{P}/markers/time"), ["markers/time", "nothing"]),
     "contact half": ("probing", _delete(f"{P}/contact/voltage"), ["contact/voltage", "nothing"]),
@@ -188,7 +189,7 @@ def test_a_damaged_file_never_escapes_as_another_error(cut, seed, tmp_path):
 
 
 def test_nothing_is_written_that_would_not_be_read(tmp_path):
-    bad = sample("uniaxial", noise=None)
+    bad = sample("uniaxial", noise=0.0)
     with pytest.raises(InputError, match="noise_std"):
         files.write(bad, tmp_path / "a.h5")
     assert not list(tmp_path.iterdir())

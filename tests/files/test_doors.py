@@ -121,15 +121,34 @@ def test_names_that_can_not_be_file_names(name, tmp_path):
         read(tmp_path / "t.toml")
 
 
-def test_a_noise_of_nothing_beside_others_is_refused(tmp_path, capsys):
+@pytest.mark.parametrize("verb", ["inspect", "fit", "diagnose"])
+@pytest.mark.parametrize("where", [["tension"], ["compression", "holdout", "planar", "tension"]])
+def test_a_noise_of_nothing_is_refused_beside_others_and_alone(where, verb, tmp_path, capsys):
     path = tmp_path / "no-noise.h5"
     path.write_bytes(Path(ELASTIC).read_bytes())
     with h5py.File(path, "r+") as file:
-        file["recordings/tension/nominal_stress"].attrs["noise_std"] = 0.0
-    assert main(["fit", str(path), "--energy", "neo-hookean", "--out", str(tmp_path / "o")]) == 2
+        for name in where:
+            file[f"recordings/{name}/nominal_stress"].attrs["noise_std"] = 0.0
+    energy = [] if verb == "inspect" else ["--energy", "neo-hookean"]
+    assert main([verb, str(path), *energy, "--out", str(tmp_path / "o")]) == 2
     said = capsys.readouterr().err
-    assert "recording tension" in said
-    assert "--weights uniform" in said
+    assert "/recordings/tension/nominal_stress" in said
+    assert "Leave it out where the noise was not recorded" in said
+    assert not (tmp_path / "o").exists()
+
+
+def test_a_noise_left_out_is_not_recorded(tmp_path, capsys):
+    path = tmp_path / "untold.h5"
+    path.write_bytes(Path(ELASTIC).read_bytes())
+    with h5py.File(path, "r+") as file:
+        for group in file["recordings"].values():
+            del group["nominal_stress"].attrs["noise_std"]
+    assert main(["inspect", str(path)]) == 0
+    assert "tension: no noise level for nominal_stress: a fit has to estimate it." in capsys.readouterr().out
+    found = ["fit", str(path), "-e", "reduced-polynomial-2", "--multistart", "1", "-o", str(tmp_path / "o"), "--json"]
+    assert main(found) == 0
+    (level,) = {round(n["std"], 6) for n in json.loads(capsys.readouterr().out)["noise"].values()}
+    assert level == pytest.approx(8.0, rel=0.1)  # what data/make_demo.py added
 
 
 def test_one_card_goes_into_the_file_named(tmp_path, capsys):

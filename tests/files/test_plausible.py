@@ -121,7 +121,8 @@ UNUSABLE = {
     "noise alone": ({"r": recording(stress=np.random.default_rng(4).normal(0, 20, N))}, "does not follow"),
     "constant": ({"r": recording(stress=np.full(N, 1025.0))}, "1025 Pa throughout while the specimen moves"),
     "two rows": ({"r": recording(time=np.arange(2.0))}, "2 samples"),
-    "noise zero beside noise": ({"a": recording(), "b": recording(noise=0.0)}, "weigh infinitely"),
+    "noise zero": ({"a": recording(noise=0.0)}, "above zero"),
+    "noise zero beside noise": ({"a": recording(), "b": recording(noise=0.0)}, "recording b: noise_std"),
 }
 
 

@@ -35,7 +35,8 @@ def write_material(case: Case, path: Path) -> None:
             group["time"] = trial.time
             group["shear" if trial.kind == "simple-shear" else "stretch"] = trial.drive
             group["nominal_stress"] = case.stress[trial.name]
-            group["nominal_stress"].attrs["noise_std"] = case.noise or 0.0  # nothing stated is written as zero
+            if case.noise is not None:
+                group["nominal_stress"].attrs["noise_std"] = case.noise
             group["direction"] = np.asarray(trial.direction, float)
 
 

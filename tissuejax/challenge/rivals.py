@@ -90,7 +90,7 @@ class Process:
 
 
 def trials_of(path) -> tuple[list[Trial], dict[str, np.ndarray], float]:
-    """Recordings of a case file (not its key): what was done, what was measured, noise."""
+    """Recordings of a case file (not its key): what was done, what was measured, noise (1 if not stated)."""
     trials, stress, noise = [], {}, 1.0
     with h5py.File(path) as file:
         for name, g in file["recordings"].items():
@@ -99,7 +99,7 @@ def trials_of(path) -> tuple[list[Trial], dict[str, np.ndarray], float]:
             sizes = (float(g.attrs[k]) for k in ("start", "area", "height", "diameter"))
             trials.append(Trial(name, kind, g["time"][()], drive, g["direction"][()], *sizes))
             stress[name] = g["nominal_stress"][()]
-            noise = float(g["nominal_stress"].attrs["noise_std"])
+            noise = float(g["nominal_stress"].attrs.get("noise_std", noise))
     return trials, stress, noise
 
 

@@ -51,7 +51,7 @@ columns time and stretch (two for biaxial). --body FILE gives the body of a prob
 of the tip's centre in the body's frame, or the name of a recording of that file, whose path and tip are taken. Units
 may stand in the names ("x (mm)"); without, it is s and m. With --states: HDF5, XDMF and VTU series for ParaView (the
 body, and as points the tip and the markers with their residuals), and, where pyvista is installed, a picture and an
-animation. Without --noise nothing is added; the noise level in the file is then a placeholder, 1e-6 of the peak.
+animation. Without --noise nothing is added, and the file states no noise level.
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
@@ -143,7 +143,7 @@ def simulated(
     values = {p: v for p, v in values.items() if p in made.model.parameters or p in made.model.declared}
     missing = [p for p, d in made.model.parameters.items() if d.each and p not in values]
     predicted = made.predict(values)
-    recorded = as_measured(predicted, sample.recordings, noise, getattr(given, "seed", 0))
+    recorded = as_measured(predicted, noise, getattr(given, "seed", 0))
     kept = Sample(sample.name, recorded, sample.geometry, sample.density, sample.gravity, f"predicted by {of.name}", "")
     files = {"recording": write(kept, target)}
     for name, recording in recorded.items():

@@ -10,7 +10,6 @@ from tissuejax.experiments.catalogue import experiment
 from tissuejax.recordings.recording import Channel, Recording
 
 MOST = 10**7  # samples: beyond, one recording fills a memory
-UNKNOWN_NOISE = 1e-6  # share of the peak written as the noise of a prediction, since a recording file must have one
 
 
 def corners(text: str, rate: float) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n ..."]]:
@@ -57,35 +56,29 @@ def probing(
     name: str, time: np.ndarray, path: Float[np.ndarray, "n 3"], radius: float, markers: np.ndarray | None = None
 ) -> Recording:
     """A probing along `path` (centre of the tip, m), not measured; `markers` (k, 3) are places on the surface."""
-    channels = {"force": Channel(time, np.zeros((len(time), 3)), "N", 1e-3)}
+    channels = {"force": Channel(time, np.zeros((len(time), 3)), "N")}
     if markers is not None:
-        channels["markers"] = Channel(time, np.tile(markers, (len(time), 1, 1)), "m", 1e-5)
+        channels["markers"] = Channel(time, np.tile(markers, (len(time), 1, 1)), "m")
     return Recording(
         name, "probing", {"probe/time": time, "probe/position": path}, channels, {"probe/radius": float(radius)}
     )
 
 
-def as_measured(
-    predicted: Mapping[str, Recording], measured: Mapping[str, Recording], noise: float | None = None, seed: int = 0
-) -> dict[str, Recording]:
-    """Predictions as recordings: with the measured channels' noise level written down, or with noise added.
+def as_measured(predicted: Mapping[str, Recording], noise: float | None = None, seed: int = 0) -> dict[str, Recording]:
+    """Predictions as recordings: with noise added and its level stated, or exact and without a level.
 
     Args:
         predicted: by name.
-        measured: what they stand for.
-        noise: standard deviation to add, SI; None adds nothing and keeps the level the measurement states, or a
-            millionth of the peak where there is none.
+        noise: standard deviation to add, SI; None or 0 adds nothing.
         seed: of the noise.
     """
     rng, found = np.random.default_rng(seed), {}
     for name, recording in predicted.items():
         channels = {}
         for key, channel in recording.channels.items():
-            values, stated = np.asarray(channel.values, float), measured[name].channels[key].noise_std
-            if noise is not None:
-                values, level = values + rng.normal(0.0, noise, values.shape), noise
-            else:
-                level = stated or UNKNOWN_NOISE * (float(np.nanmax(np.abs(values), initial=0.0)) or 1.0)
-            channels[key] = Channel(channel.time, values, channel.unit, level)
+            values = np.asarray(channel.values, float)
+            if noise:
+                values = values + rng.normal(0.0, noise, values.shape)
+            channels[key] = Channel(channel.time, values, channel.unit, noise or None)
         found[name] = Recording(name, recording.experiment, recording.inputs, channels, recording.attributes)
     return found

@@ -202,7 +202,13 @@ def _tabled(file: str, path: Path, height: float) -> list[Recording]:
 def _noise(series: Series, unit: str, what: str) -> float:
     """The noise level as stated, or the median over all components of what neighbouring samples differ by."""
     if series.noise is not None:
-        return quantity(series.noise, unit, f"{what}.noise")
+        stated = quantity(series.noise, unit, f"{what}.noise")
+        if not stated > 0:
+            raise InputError(
+                f"{what}.noise: found {series.noise!r}, expected a standard deviation above zero; leave it out where "
+                "the noise was not recorded"
+            )
+        return stated
     flat = series.values.reshape(len(series.time), -1)
     seen = [noise_estimate(series.time, c) for c in flat.T if np.isfinite(c).all()]
     found = float(np.median(seen)) if seen else 0.0

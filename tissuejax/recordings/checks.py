@@ -67,6 +67,25 @@ def positive(
         )
 
 
+def noise_level(value: float, file: object, item: str, unit: str) -> None:
+    """Refuse a standard deviation of noise that is zero (data would weigh infinitely) or negative."""
+    if not value > 0:
+        advice = "Leave it out where the noise was not recorded: a fit then estimates it."
+        expected = f"a standard deviation above zero{'' if unit == '1' else f', in {unit}'}"
+        raise refusal(file, item, f"{value:g}", expected, advice)
+
+
+def noise_levels(recordings: Mapping[str, Recording], file: object) -> None:
+    """The same of every level that recordings state, whichever format they came in."""
+    for name, recording in recordings.items():
+        for key, channel in recording.channels.items():
+            if channel.noise_std is not None:
+                noise_level(channel.noise_std, file, f"recording {name}: noise_std of {key}", channel.unit)
+        for key, value in recording.attributes.items():
+            if key.endswith("/noise_std"):
+                noise_level(value, file, f"recording {name}: {key}", "1")
+
+
 def stretches(values: Float[np.ndarray, "n ..."], file: object, item: str) -> None:
     """Refuse stretches that are not above zero, guessing at the usual cause."""
     if (values <= 0).any():

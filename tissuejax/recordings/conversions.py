@@ -73,3 +73,9 @@ def noise_estimate(abscissa: Float[np.ndarray, " n"], values: Series) -> float:
     a = ((after - here) / (after - before)).reshape(-1, *[1] * (values.ndim - 1))
     deviation = a * values[:-2] + (1 - a) * values[2:] - values[1:-1]
     return float(np.sqrt(np.mean(deviation**2 / (a**2 + (1 - a) ** 2 + 1))))
+
+
+def noise_of(abscissa: Float[np.ndarray, " n"], values: Series) -> float | None:
+    """`noise_estimate`, at least a millionth of the peak, because exact data would weigh infinitely; None where all
+    values are zero."""
+    return max(noise_estimate(abscissa, values), 1e-6 * float(np.abs(values).max())) or None

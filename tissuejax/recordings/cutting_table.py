@@ -114,8 +114,7 @@ def cut_from(
         raise checks.refusal(place, "depth of the cut", found, f"0 to the tissue's height, {1e3 * height:.3g} mm")
     x, zero = values["displacement"], np.zeros(len(time))
     force = np.stack([values["force"], zero, values.get("force_z", zero)], 1)
-    estimate = max(convert.noise_estimate(time, values["force"]), 1e-6 * float(np.abs(values["force"]).max()))
-    std = estimate if noise == "estimate" else quantity(noise, "N", "noise.force")
+    std = convert.noise_of(time, values["force"]) if noise == "estimate" else quantity(noise, "N", "noise.force")
     attributes = {
         "blade/thickness": setup.blade["thickness"], "blade/profile": edge(setup, side),
     }  # fmt: skip

@@ -92,6 +92,7 @@ def _one(kind: Format, path: Path, name: str) -> Sample:
     checks.named(sample.name, path, "sample")
     for recording in sample.recordings:
         checks.named(recording, path, "recording")
+    checks.noise_levels(sample.recordings, path)
     return sample
 
 

@@ -187,20 +187,16 @@ def _item(group: h5py.Group, item: Item, sizes: dict[str, int], source: Source) 
 
 
 def _noise(group: h5py.Group, item: Item, source: Source) -> float | None:
-    """`noise_std` of the dataset or of the subgroup that it lies in."""
-    if item.noise == "none":
+    """`noise_std` of the dataset or of the subgroup that it lies in; None where it was not recorded."""
+    if not item.noise:
         return None
     owner = item.path.rpartition("/")[0]
     holders = [group[item.path], *([group[owner]] if owner else [])]
     for holder in holders:
         value = source.number(holder, "noise_std")
         if value is not None:
-            place = attribute(holder, "noise_std")
-            checks.positive(value, source.label, place, f"a standard deviation in {item.unit}", zero=True)
+            checks.noise_level(value, source.label, attribute(holder, "noise_std"), item.unit)
             return value
-    if item.noise == "required":
-        advice = "Give the standard deviation of the sensor's noise (0 where there is none)."
-        raise source.refusal(attribute(holders[-1], "noise_std"), "nothing", f"a number in {item.unit}", advice)
     return None
 
 

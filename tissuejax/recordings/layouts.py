@@ -20,7 +20,7 @@ class Item:
         unit: SI unit.
         time: path of the item's time vector, for a channel.
         channel: the channel's name in a Recording.
-        noise: whether `noise_std` is "required", "optional" or "none".
+        noise: whether `noise_std` may be stated.
         optional: True if the item (or the subgroup that it lies in) may be missing.
         nan: True if NaN is allowed (lost markers).
         stretch: True if the values are stretches, above zero.
@@ -32,7 +32,7 @@ class Item:
     unit: str
     time: str = ""
     channel: str = ""
-    noise: str = "none"
+    noise: bool = False
     optional: bool = False
     nan: bool = False
     stretch: bool = False
@@ -56,8 +56,8 @@ class Scalar:
 def _homogeneous(kinematic: str, shape: tuple[str | int, ...], stretch: bool = True) -> tuple[Item, ...]:
     return (
         Item("time", ("n",), "time", "s"),
-        Item(kinematic, shape, "input", "1", noise="optional", stretch=stretch),
-        Item("nominal_stress", shape, "channel", "Pa", "time", "nominal_stress", "required"),
+        Item(kinematic, shape, "input", "1", noise=True, stretch=stretch),
+        Item("nominal_stress", shape, "channel", "Pa", "time", "nominal_stress", noise=True),
         Item("direction", (3,), "attribute", "1", optional=True),
         Item("normal", (3,), "attribute", "1", optional=True),
     )
@@ -65,7 +65,7 @@ def _homogeneous(kinematic: str, shape: tuple[str | int, ...], stretch: bool = T
 
 _FORCE = (
     Item("force/time", ("f",), "time", "s"),
-    Item("force/value", ("f", 3), "channel", "N", "force/time", "force", "required"),
+    Item("force/value", ("f", 3), "channel", "N", "force/time", "force", noise=True),
 )
 _MARKERS = (
     Item("markers/time", ("m",), "time", "s", optional=True),
@@ -76,7 +76,7 @@ _MARKERS = (
         "m",
         "markers/time",
         "markers",
-        "required",
+        noise=True,
         optional=True,
         nan=True,
     ),

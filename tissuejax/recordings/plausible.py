@@ -10,6 +10,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from tissuejax.errors import InputError
+from tissuejax.recordings import checks
 from tissuejax.recordings import plausible_signals as signals
 from tissuejax.recordings.plausible_signals import drive_of, load_of, unanswered
 from tissuejax.recordings.recording import Recording, Sample
@@ -40,8 +41,8 @@ def refuse_unusable(sample: Sample, names: Iterable[str]) -> None:
 
     Raises:
         InputError: fewer than three samples, values beyond 1e20, a channel that reads zero throughout, one that never
-            changes while nothing is done either, a stress that does not answer the deformation, or a noise level of
-            zero beside recordings with noise.
+            changes while nothing is done either, a stress that does not answer the deformation, or a noise level that
+            is not above zero.
     """
     names = tuple(names)
     for name in names:
@@ -75,13 +76,7 @@ def refuse_unusable(sample: Sample, names: Iterable[str]) -> None:
                     f"recording {name}: neither the deformation nor {key} ever changes: there is nothing to fit; "
                     "check the columns that were read"
                 )
-    stds = {n: c.noise_std for n in names for k, c in sample.recordings[n].channels.items() if k != "markers"}
-    zero = [n for n, s in stds.items() if s == 0]
-    if zero and any(s for s in stds.values()):
-        raise InputError(
-            f"recording {zero[0]}: noise_std is 0 while other recordings have noise: it would weigh infinitely; give "
-            "its noise level, leave it out of the file, or fit with --weights uniform"
-        )
+    checks.noise_levels({name: sample.recordings[name] for name in names}, sample.name)
 
 
 def refuse_gaps(sample: Sample, names: Iterable[str]) -> None:

@@ -346,8 +346,11 @@ def _noise(name: str, value: object) -> str | Column:
         raise unknown("quantity in [noise]", name, [q for q in QUANTITIES if q != "time"])
     if isinstance(value, dict):
         return _column(f"noise.{name}", value, QUANTITIES[name])
-    if value != "estimate" and quantity(value, QUANTITIES[name], f"noise.{name}") < 0:
-        raise InputError(f"noise.{name}: found {value!r}, expected a standard deviation that is not negative")
+    if value != "estimate" and quantity(value, QUANTITIES[name], f"noise.{name}") <= 0:
+        raise InputError(
+            f"noise.{name}: found {value!r}, expected a standard deviation above zero; leave the line out where the "
+            "noise was not recorded"
+        )
     return str(value)
 
 

@@ -317,15 +317,14 @@ def _said(stated: str | Column, quantity_name: str, columns: Columns, rows: np.n
 
 def _noise(
     part: Part, load: str, columns: Columns, rows: np.ndarray, per_unit: float, abscissa: np.ndarray, stress: np.ndarray
-) -> float:
+) -> float | None:
     others = [q for q in part.noise if q in STRESS and q not in (load, "nominal_stress")]
     if others:
         raise InputError(f"noise.{others[0]}: the load column is {load}: give noise.{load} or noise.nominal_stress")
     for q, scale in ((load, per_unit), ("nominal_stress", 1.0)):
         if part.noise.get(q, "estimate") != "estimate":
             return _said(part.noise[q], q, columns, rows) * scale
-    # A floor, because exact data would weigh infinitely.
-    return max(convert.noise_estimate(abscissa, stress), 1e-6 * float(np.abs(stress).max()))
+    return convert.noise_of(abscissa, stress)
 
 
 def _slope(values: np.ndarray, motion: np.ndarray, kind: str, sizes: Sizes) -> float:
@@ -364,8 +363,7 @@ def _probing(
     force = np.zeros((len(time), 3))
     force[:, 2] = values["force"]
     stated = part.noise.get("force", "estimate")
-    estimate = max(convert.noise_estimate(time, values["force"]), 1e-6 * float(np.abs(values["force"]).max()))
-    noise = estimate if stated == "estimate" else quantity(stated, "N")
+    noise = convert.noise_of(time, values["force"]) if stated == "estimate" else quantity(stated, "N")
     inputs = {"probe/time": time, "probe/position": position}
     channel = Channel(time, force, "N", noise)
     return Recording(name, "probing", inputs, {"force": channel}, attributes | {"probe/radius": radius})
