@@ -1,5 +1,6 @@
 """A fit of a small probing: found again on hexes and on tets, and taken up where a killed one was."""
 
+import io
 import json
 import subprocess
 import sys
@@ -19,7 +20,9 @@ from tissuejax.fitting.options import Objective, Unknowns
 from tissuejax.fitting.probed import fit_probed
 from tissuejax.fitting.setup import problem
 from tissuejax.fitting.stress_curve import fit_stress_curve
+from tissuejax.progress import Lines
 from tissuejax.recordings.recording import Geometry, Sample
+from tissuejax.report.fit_overlay import FitOverlay
 
 START = {"energy.C10": 800.0}
 KNOWN = {"energy.C20": 300.0, "volumetric.K": 10e3}
@@ -173,3 +176,31 @@ def test_standard_errors_are_those_of_derivatives_at_lifes_pace():
     expected = np.sqrt(np.diag(np.linalg.inv(J.T @ J))) * max(1.0, found.fit.chi2_per_dof**0.5)
     for path, std in zip(both.free, expected, strict=True):
         assert found.noise_std[path] == pytest.approx(std, rel=0.1)
+
+
+def test_what_was_held_out_has_the_band_that_it_would_have_if_fitted():
+    """The same press, measured once more with other noise and the same marker lost: its derivatives are those of the
+    first, so are its bands."""
+    first = posed().predictor.sample.recordings["r1"]
+    told = {n: np.array(c.values, float) for n, c in first.channels.items()}
+    told["markers"][20:, 1] = np.nan
+    rng = np.random.default_rng(8)
+    seen = {n: replace(c, values=told[n]) for n, c in first.channels.items()}
+    again = {n: replace(c, values=told[n] + rng.normal(0, c.noise_std, told[n].shape)) for n, c in seen.items()}
+    both = [replace(first, name=n, channels=c) for n, c in (("r1", seen), ("r2", again))]
+    one = predictor(model(), sample(*both), ("r1",), settings=QUICK)
+    made = problem(one, unknowns=Unknowns(start=START, fix=KNOWN))
+    two = replace(made, free=("energy.C10", "volumetric.K"), start=made.start | {"volumetric.K": 8e3})
+    said = io.StringIO()
+    progress = Lines(every=0.0, file=said)
+    found = fit_probed(two, holdout=("r2",), numerical=False, finish=False, progress=progress).fit
+    assert "band of what was held out" in said.getvalue()
+    for channel, width in (("force", (len(seen["force"].time), 3)), ("markers", (len(seen["markers"].time),))):
+        fitted, held = (found.curve_std[n][channel] for n in ("r1", "r2"))
+        assert held.shape == width
+        assert held.max() > 0
+        np.testing.assert_allclose(held, fitted, rtol=1e-9, atol=1e-9 * held.max())
+    caption = FitOverlay().caption(FitOverlay().prepare(found))
+    assert "Band: where 95 %" in caption
+    assert "No band" not in caption
+    assert "Orange" in caption

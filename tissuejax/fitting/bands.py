@@ -13,6 +13,7 @@ from jaxtyping import Float
 from tissuejax.estimation.covariance import Uncertainty
 from tissuejax.estimation.problem import Problem
 from tissuejax.recordings.marker_motion import ways
+from tissuejax.recordings.recording import Recording
 
 Std = dict[str, dict[str, Float[np.ndarray, "n ..."]]]
 
@@ -23,10 +24,37 @@ def prediction_std(problem: Problem, values: Mapping[str, float], spread: Uncert
     Linear in the parameters around the estimate. Combinations that the data leave open to rounding have no share: their
     columns of J are zero where they were fitted.
     """
+    return {
+        name: {channel: carried(J, spread) for channel, J in channels.items()}
+        for name, channels in _slopes(problem, values, names).items()
+    }
+
+
+def held_out_std(
+    problem: Problem, values: Mapping[str, float], spread: Uncertainty, predicted: Mapping[str, Recording]
+) -> Std:
+    """The same of probings that took no part in the fit, at one further Jacobian; of markers as in `marker_std`.
+
+    Args:
+        predicted: these recordings by name, at `values`.
+    """
+    found: Std = {}
+    for name, channels in _slopes(problem, values, tuple(predicted)).items():
+        for channel, J in channels.items():
+            places = np.asarray(predicted[name].channels[channel].values, float)
+            if places.ndim == 3:
+                seen = np.isfinite(np.asarray(problem.predictor.sample.recordings[name].channels[channel].values))
+                J = _mean_way(np.where(seen[..., None], J, np.nan), places)
+            found.setdefault(name, {})[channel] = carried(J, spread)
+    return found
+
+
+def _slopes(problem: Problem, values: Mapping[str, float], names: tuple[str, ...]) -> Std:
+    """Derivatives to the free parameters along a last axis, by recording and channel."""
     _, slopes = problem.predictor.of(names).jacobian(dict(values), problem.free)
     return {
         name: {
-            channel: carried(np.stack([np.asarray(slopes[p][name][channel], float) for p in problem.free], -1), spread)
+            channel: np.stack([np.asarray(slopes[p][name][channel], float) for p in problem.free], -1)
             for channel in slopes[problem.free[0]][name]
         }
         for name in names
@@ -62,11 +90,16 @@ def marker_std(problem: Problem, jacobian: Float[np.ndarray, "n p"], spread: Unc
             continue
         J = np.full((places.size, jacobian.shape[1]), np.nan)
         J[problem.seen[key]] = jacobian[rows] * problem.sigma(key)
-        moved = np.einsum("nmip,mi->nmp", J.reshape(*places.shape, -1), ways(places))
-        seen = np.isfinite(moved).all(-1, keepdims=True)
-        count = np.maximum(seen.sum(1), 1)
-        found.setdefault(key[0], {})[key[1]] = carried(np.where(seen, moved, 0.0).sum(1) / count, spread)
+        mean = _mean_way(J.reshape(*places.shape, -1), places)
+        found.setdefault(key[0], {})[key[1]] = carried(mean, spread)
     return found
+
+
+def _mean_way(J: Float[np.ndarray, "n m 3 p"], places: Float[np.ndarray, "n m 3"]) -> Float[np.ndarray, "n p"]:
+    """Derivatives of the markers' mean way from those of their places, lost ones (NaN) left out."""
+    moved = np.einsum("nmip,mi->nmp", J, ways(places))
+    seen = np.isfinite(moved).all(-1, keepdims=True)
+    return np.where(seen, moved, 0.0).sum(1) / np.maximum(seen.sum(1), 1)
 
 
 def carried(J: Float[np.ndarray, "... p"], spread: Uncertainty) -> Float[np.ndarray, "..."]:

@@ -29,13 +29,14 @@ from tissuejax.estimation.stability import recorded_stability
 from tissuejax.estimation.transforms import chained, unchained
 from tissuejax.experiments.probing_predictor import ProbingPredictor, make_ready
 from tissuejax.fitting.advice import warnings_of
-from tissuejax.fitting.bands import fitted_std, marker_std
+from tissuejax.fitting.bands import Std, fitted_std, held_out_std, marker_std
 from tissuejax.fitting.checkpoint import Checkpoint, mark_of
 from tissuejax.fitting.closing import close
 from tissuejax.fitting.result import Fit, Iterate
 from tissuejax.fitting.scores import scores
 from tissuejax.fitting.simulated import Simulated
 from tissuejax.progress import Progress, Silent
+from tissuejax.recordings.recording import Recording
 
 PROBED_METHOD = "levenberg-marquardt"
 LAST = 15.0  # standard errors: after a step shorter than this the rest is left to the chord steps of the end
@@ -132,9 +133,10 @@ def fit_probed(
         fitted = dict(runs.simulated.all([final], values)[0])
         stage.advance(note="held out")
         held = dict(runs.simulated.all([final.of(holdout)], values)[0]) if holdout else {}
+        noise_part = _noise_part(problem, x, J, r)
+        spread = _with_shifts(noise_part, [np.array(list(s.values())) for s in shifts.values()])
+        shown = _shown_std(problem, J, spread, fitted) | (runs.held_out_std(values, spread, held) if held else {})
     status = "the last steps are still long" if left >= LAST else "converged" if descent.converged else descent.reason
-    noise_part = _noise_part(problem, x, J, r)
-    spread = _with_shifts(noise_part, [np.array(list(s.values())) for s in shifts.values()])
     measured = fine.sample.recordings
     std = dict(problem.noise.std)
     for name in holdout:
@@ -163,7 +165,7 @@ def fit_probed(
             name: {c: {"before": before[name][c], "after": rms} for c, rms in channels.items()}
             for name, channels in after.items()
         },
-        curve_std=_shown_std(problem, J, spread, fitted),
+        curve_std=shown,
     )
     found.warnings.extend(warnings_of(found))
     if shifts:
@@ -223,6 +225,12 @@ class Runs(LeastSquares):
         self.jacobians += 1
         return self.problem.linearised(self.problem.values(x))[1]
 
+    def held_out_std(self, values: Mapping[str, float], spread: Uncertainty, held: Mapping[str, Recording]) -> Std:
+        """See `bands.held_out_std`, by the simulation of `exact`."""
+        self.stage.advance(note="band of what was held out")
+        self.jacobians += 1
+        return held_out_std(self.problem, values, spread, held)
+
     def accepted(self, n: int, cost: float, y: Float[np.ndarray, " p"]) -> None:
         """Keep an accepted step and show it."""
         self._accepted(n, cost, self.problem.values(self.problem.box.bounded(y)[0]), closing=False)
@@ -248,7 +256,7 @@ def vector_errors(problem: Problem, residuals: Float[np.ndarray, " n"]) -> dict[
     return found
 
 
-def _shown_std(problem: Problem, J, spread: Uncertainty, fitted: Mapping) -> dict[str, dict[str, np.ndarray]]:
+def _shown_std(problem: Problem, J, spread: Uncertainty, fitted: Mapping) -> Std:
     """Standard deviation of what a picture shows: every component of the force, of the markers their mean way."""
     marks = marker_std(problem, J, spread, fitted)
     return {name: of | marks.get(name, {}) for name, of in fitted_std(problem, J, spread).items()}

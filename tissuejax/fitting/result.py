@@ -58,7 +58,7 @@ class Fit(Solution):
         method: how it was minimised.
         sites: for probings, root mean square length of the error vectors of each recording and channel, SI, at the
             start and at the end ("before", "after"; Lister 2012, eq. 2.2 and 2.3).
-        curve_std: for probings, standard deviation of the predicted curves of the fitted recordings by recording and
+        curve_std: for probings, standard deviation of the predicted curves by recording and
             channel, SI (`bands`); of material tests it is computed when it is drawn.
         first: where it began, if a surrogate was asked first (`fitting.first`).
     """

@@ -111,7 +111,7 @@ def draw_curve(ax, curve: Curve, by_time: bool) -> None:
 
 
 def _bands(found: Fit) -> dict[tuple[str, str], np.ndarray]:
-    """Half widths by (recording, channel label); of probings for the fitted recordings, whose Jacobian the fit has."""
+    """Half widths by (recording, channel label)."""
     problem, spread = found.problem, found.uncertainty
     std = found.curve_std
     if problem.predictor.name == "homogeneous":
