@@ -14,6 +14,12 @@ def rooms() -> list[str]:
     return sorted((folders | {p.stem for p in PACKAGE.glob("*.py")}) - LEFT_OUT)
 
 
+def on_config(config):
+    """Put the API pages behind the pages that `mkdocs.yml` lists in reading order."""
+    config.nav = [*config.nav, {"API": [f"api/{room}.md" for room in rooms()]}]
+    return config
+
+
 def on_files(files: Files, config) -> Files:
     """Add `api/ROOM.md` for each room."""
     for room in rooms():

@@ -1,4 +1,4 @@
-"""Parameters that swallow missing physics come back once it is named: the README's table, by closed forms."""
+"""Parameters that swallow missing physics come back once it is named: the table of the page, by closed forms."""
 
 import json
 from pathlib import Path
