@@ -8,7 +8,7 @@ import pytest
 
 import tissuejax as tj
 from tests.cohorts import SETTINGS, STRETCH, cohort, pull
-from tissuejax.campaign.run import begin, go_on, status, table
+from tissuejax.campaign.run import begin, fits, go_on, status, table
 from tissuejax.campaign.store import Store
 from tissuejax.cli import main
 from tissuejax.errors import InputError
@@ -39,6 +39,24 @@ def test_what_a_fit_would_call_suspect_is_counted_and_said(tmp_path, capsys):
     assert main(["campaign", "run", str(tmp_path / "d"), str(tmp_path / "stiff.h5"), *asked]) == 4
     assert main(["campaign", "report", str(tmp_path / "d")]) == 4
     assert main(["campaign", "status", str(tmp_path / "d")]) == 0
+
+
+def test_specimens_of_one_name_in_several_files_are_kept_apart(tmp_path):
+    """Two laboratories called theirs "s"; one file lies there twice, and is one specimen."""
+    rng, stiffness = np.random.default_rng(4), {"a": 1000.0, "b": 2000.0, "c": 2000.0}
+    elastic = STRETCH - STRETCH**-2
+    noise = 5 * rng.normal(size=20)
+    for name, mu in stiffness.items():
+        (tmp_path / name).mkdir()
+        write(pull("s", mu * elastic + noise), tmp_path / name / "s.h5")
+    write(pull("t", 3000.0 * elastic + noise), tmp_path / "a" / "t.h5")
+    files = [tmp_path / "a" / "t.h5", *(tmp_path / name / "s.h5" for name in stiffness)]
+    begin(tmp_path / "camp", [str(f) for f in files], SETTINGS)
+    assert go_on(tmp_path / "camp")["done"] == 4
+    found = {name: r["parameters"]["energy.mu"]["value"] for name, r in fits(tmp_path / "camp").items()}
+    assert list(found) == ["t", "s of a/s.h5", "s of b/s.h5"]
+    np.testing.assert_allclose(list(found.values()), [3000.0, 1000.0, 2000.0], rtol=0.02)
+    assert [r["sample"] for r in table(tmp_path / "camp")] == [*found, "s of c/s.h5"]
 
 
 def test_a_fit_of_an_earlier_version_is_not_taken_for_a_good_one(tmp_path):

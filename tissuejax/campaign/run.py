@@ -2,6 +2,8 @@
 
 import os
 import time
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -66,19 +68,39 @@ def status(folder: Path) -> dict[str, Any]:
     planned, _ = store.planned()
     counts: dict[str, Any] = {"cases": len(planned), "done": 0, "failed": 0, "missing": 0, "suspect": 0}
     counts |= {"suspect_kinds": {}, "failures": {}}
-    for task, row in store.rows(planned):
+    for name, (task, row) in zip(labels(planned), store.rows(planned), strict=True):
         if row is None:
             counts["missing"] += 1
         else:
             counts[row["status"]] += 1
             if row["status"] == "failed":
-                name = task.sample if task.sample not in counts["failures"] else f"{task.sample} of {task.file}"
                 counts["failures"][name] = row["reason"]
             elif kinds := doubts(task, row):
                 counts["suspect"] += 1
                 for kind in kinds:
                     counts["suspect_kinds"][kind] = counts["suspect_kinds"].get(kind, 0) + 1
     return counts | {"usable": counts["done"] - counts["suspect"]}
+
+
+def fits(folder: Path) -> dict[str, dict[str, Any]]:
+    """Records of the finished fits by specimen, with what makes them suspect; the same data are one specimen."""
+    store = Store(folder)
+    planned, _ = store.planned()
+    found = {}
+    for name, (task, row) in zip(labels(planned), store.rows(planned), strict=True):
+        if row and row["status"] == "done" and "correlation" in row["answer"]:
+            found.setdefault(task.key, (name, row["answer"] | {"suspect": doubts(task, row)}))
+    return dict(found.values())
+
+
+def labels(planned: Sequence[Task]) -> list[str]:
+    """The name of each case's sample; of samples of one name in several files also the file, as far as it differs."""
+    seen = Counter(task.sample for task in planned)
+    root = os.path.commonpath([os.path.dirname(os.path.abspath(task.file)) for task in planned]) if planned else ""
+    return [
+        t.sample if seen[t.sample] == 1 else f"{t.sample} of {os.path.relpath(os.path.abspath(t.file), root)}"
+        for t in planned
+    ]
 
 
 def doubts(task: Task, row: dict[str, Any]) -> dict[str, list[str]]:
@@ -109,8 +131,9 @@ def table(folder: Path) -> list[dict[str, Any]]:
     """One row a case: sample, status, what makes it suspect, chi-square, parameters with their errors; for a diagnosis
     the verdict."""
     store, found = Store(folder), []
-    for task, row in store.rows(store.planned()[0]):
-        line: dict[str, Any] = {"sample": task.sample, "status": "missing" if row is None else row["status"]}
+    planned, _ = store.planned()
+    for name, (task, row) in zip(labels(planned), store.rows(planned), strict=True):
+        line: dict[str, Any] = {"sample": name, "status": "missing" if row is None else row["status"]}
         if row is not None and row["status"] == "failed":
             line["reason"] = row["reason"]
         elif row is not None and task.settings.kind == "fit":

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from tissuejax import verbs
-from tissuejax.campaign.run import begin, doubts, engines, go_on, headline, status, table, units
+from tissuejax.campaign.run import begin, engines, fits, go_on, headline, status, table, units
 from tissuejax.campaign.store import PLAN, Store
 from tissuejax.campaign.task import Settings, first_of
 from tissuejax.commands.arguments import add_fit, add_model, fit_options, positive
@@ -191,15 +191,10 @@ def _population(folder: Path, pattern: str | None) -> Reply:
     from tissuejax.campaign.population import estimates, population
     from tissuejax.report.population_page import parameters, write_population
 
-    store = Store(folder)
-    fits = {
-        task.sample: row["answer"] | {"suspect": doubts(task, row)}
-        for task, row in store.rows(store.planned()[0])
-        if row and row["status"] == "done" and "correlation" in row["answer"]
-    }
-    if not fits:
+    specimens = fits(folder)
+    if not specimens:
         raise InputError(f"{folder}: no finished fits (a population is one of fits, not of diagnoses)")
-    found = population(estimates(fits, None if pattern is None else _groups(fits, pattern)))
+    found = population(estimates(specimens, None if pattern is None else _groups(specimens, pattern)))
     record = found.record()
     files = write_population(found, folder / "population")
     lines = [f"{record['specimens']} specimens" + (f" in {len(record['groups'])} groups" if record["groups"] else "")]
