@@ -78,7 +78,7 @@ def main(folder: Path) -> str:
     panels = [curve for found in joint.values() for curve in curves(found)]
     figure, axes = grid(len(panels), columns=4, width=12)
     for ax, curve, title in zip(axes, panels, [REGIONS[r] for r in REGIONS for _ in MODES], strict=True):
-        draw_curve(ax, curve)
+        draw_curve(ax, curve, by_time=False)
         ax.set_title(title, loc="left", fontsize=9)
     write_bytes(folder / "figures" / "regions.png", png(figure))
     tj.write(joint["CX"], folder / "figures" / "cortex")
