@@ -10,8 +10,6 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
-BARE = ("real-time",)  # not stored with outputs yet: it only has to run
-STORED = [p for p in NOTEBOOKS if p.stem not in BARE]
 LONG = ("which-ogden-form", "probing-stl", "probing-fit")  # run by `make slow`
 LARGEST = 200_000  # bytes of a stored notebook
 NEAR, SMALL = 0.1, 1e-2  # numbers printed again: this near, or both this small (errors, differences)
@@ -34,15 +32,13 @@ def test_it_runs_and_prints_what_is_stored(path, monkeypatch):
     notebook = nbformat.read(path, as_version=4)
     assert "assert" in notebook.cells[-1].source, "a notebook ends in numbers that are asserted"
     now, stored = printed(executed(path)), printed(notebook)
-    if path not in STORED:
-        return
     again = f"the stored output is not this code's: python notebooks/execute.py {path.stem}"
     assert NUMBER.sub("#", now) == NUMBER.sub("#", stored), again
     for a, b in zip(map(float, NUMBER.findall(now)), map(float, NUMBER.findall(stored)), strict=True):
         assert abs(a - b) <= NEAR * max(abs(a), abs(b)) or max(abs(a), abs(b)) < SMALL, f"{a} for {b}: {again}"
 
 
-@pytest.mark.parametrize("path", STORED, ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
 def test_it_is_stored_with_outputs_and_a_picture(path):
     cells = nbformat.read(path, as_version=4).cells
     outputs = [o for c in cells for o in c.get("outputs", ())]

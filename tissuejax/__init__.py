@@ -22,10 +22,12 @@ NOUNS = {
     "Model": "model",
     "NotConverged": "errors",
     "Objective": "fitting.options",
+    "ProbingSettings": "experiments.probing_settings",
     "Recording": "recordings.recording",
     "Sample": "recordings.recording",
     "Search": "fitting.options",
     "Unknowns": "fitting.options",
+    "predictor": "experiments.predictor",
 }
 
 __all__ = [*VERBS, *NOUNS, "__version__"]
