@@ -5,9 +5,11 @@
 Writes `results/growth.json` and `results/growth.png`: seconds of CPU time of this process, each measured after a first
 call that compiles. Beside each series stands the power p of cost ~ n^p that a straight line through the logarithms has.
 Recordings are those of `data/demo/relaxing.h5` over and over, each with noise of its own; candidates are effects of the
-catalogue, the one that acts (viscoelasticity) first.
+catalogue, the one that acts (viscoelasticity) first. `--draw` draws the stored figures again.
 """
 
+import json
+import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -87,26 +89,34 @@ def series() -> dict[str, dict[str, dict[str, float]]]:
 def draw(found: dict[str, dict[str, dict[str, float]]]) -> None:
     """A panel for each thing that grows."""
     from matplotlib.figure import Figure
-    from matplotlib.ticker import NullFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    figure = Figure(figsize=(11, 3.0), layout="constrained")
+    figure = Figure(figsize=(12, 3.2), layout="constrained")
     for ax, (what, rows) in zip(figure.subplots(1, len(found)), found.items(), strict=True):
+        n: list[float] = []
         for name, row in rows.items():
             n, seconds = [float(k) for k in row], list(row.values())
             ax.loglog(n, seconds, "o-", markersize=4, linewidth=1.2, label=f"{name}: power {power(n, seconds):.2f}")
-        ax.set(xlabel=what, ylabel="s of CPU time")
+        low, high = ax.get_ylim()
+        ax.set(xlabel=what, ylabel="s of CPU time", ylim=(low / 1.2, high * 2.5))  # room for the legend
         ax.set_xticks(n, [f"{x:,.0f}" for x in n])
         ax.xaxis.set_minor_formatter(NullFormatter())
+        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 100 * low else (1.0,)))
+        ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
         ax.yaxis.set_minor_formatter(NullFormatter())
         ax.tick_params(labelsize=8)
         ax.spines[["top", "right"]].set_visible(False)
-        ax.legend(fontsize=7, frameon=False)
+        ax.legend(fontsize=8, frameon=False, loc="upper left")
     figure.savefig(RESULTS / "growth.png", dpi=110)
 
 
 def main() -> None:
-    found = series()
-    write("growth", {"unit": "s of CPU time, best of what was measured, programs compiled before"} | found)
+    if "--draw" in sys.argv:
+        kept = json.loads((RESULTS / "growth.json").read_text())
+        found = {k: v for k, v in kept.items() if k not in ("unit", "machine")}
+    else:
+        found = series()
+        write("growth", {"unit": "s of CPU time, best of what was measured, programs compiled before"} | found)
     draw(found)
 
 

@@ -2,8 +2,9 @@
 
     OMP_NUM_THREADS=1 XLA_FLAGS=--xla_cpu_multi_thread_eigen=false python tests/bench/bench_step.py
 
-Prints a table and writes `results/step.json` and `results/growth.png`: nanoseconds of CPU time an element and step, the
-best of several, and ratios. The energies of one size take turns, so that a busy machine disturbs their ratio least.
+Prints a table and writes `results/step.json`: nanoseconds of CPU time an element and step, the best of several, and
+ratios (`bench_growth.py` draws how it grows). The energies of one size take turns, so that a busy machine disturbs
+their ratio least.
 "bent" is the same cube taken for general hexes, as bodies from a point cloud are.
 """
 
@@ -102,28 +103,6 @@ def large() -> None:
     print(json.dumps({"peak memory MiB": peak(), "of it before the run (Python, JAX, mesh)": before}))
 
 
-def draw(figures: dict) -> None:
-    """Growth with elements and with steps."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8.5, 3.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    sizes = [1000, 8000, 27000]
-    for name in ("neo-Hookean float32", "N=4 float32", "N=4 float32, bent", "neo-Hookean float64"):
-        cost = [figures[f"{n} hexes"][name] * n * 1e-6 for n in sizes]
-        left.loglog(sizes, cost, "o-", markersize=4, linewidth=1.2, label=name)
-    left.loglog(sizes, [140e-6 * n for n in sizes], ":", color="#777777", label="140 ns an element (NiftySim)")
-    left.set(xlabel="hexes", ylabel="ms a step")
-    steps = figures["1000 hexes, s by steps"]
-    right.plot([int(n) for n in steps], list(steps.values()), "o-", markersize=4, linewidth=1.2)
-    right.set(xlabel="steps, 1,000 hexes, N=4 float32", ylabel="s", xlim=(0, None), ylim=(0, None))
-    left.legend(fontsize=7, frameon=False)
-    for ax in (left, right):
-        ax.tick_params(labelsize=8)
-        ax.spines[["top", "right"]].set_visible(False)
-    figure.savefig(RESULTS / "growth.png", dpi=100)
-
-
 def main() -> None:
     figures = {}
     for n in (10, 20, 30):
@@ -140,16 +119,9 @@ def main() -> None:
             "float64 over float32": round(best["neo-Hookean float64"] / best["neo-Hookean float32"], 2),
         }
         print(f"{n**3} hexes", figures[f"{n**3} hexes"], flush=True)
-    by_steps = {}
-    for steps in (50, 100, 200):
-        scene = cube(10, 4, jnp.float32, steps=steps)
-        jax.block_until_ready(compiled(scene))
-        by_steps[20 * steps] = round(min(cpu(compiled, scene) for _ in range(4)), 4)
-    figures["1000 hexes, s by steps"] = by_steps
     told = subprocess.run([sys.executable, __file__, "--large"], capture_output=True, text=True, check=True)
     figures["85184 hexes"] = json.loads(told.stdout.splitlines()[-1])
     write("step", {"unit": "ns of CPU time an element and step"} | figures)
-    draw(figures)
 
 
 if __name__ == "__main__":
