@@ -25,6 +25,14 @@ settings.load_profile("suite")
 
 PROGRAMS = "JAX_COMPILATION_CACHE_DIR"
 
+# Files that take a worker longest, the longest first: begun late, one of them would keep one core alone in the end.
+LONGEST = (
+    "test_lanes", "test_cli", "test_notebooks", "test_gradients", "test_doors", "test_effects", "test_predictor",
+    "test_fit_small", "test_probing_bench", "test_refusals", "test_recordings_real", "test_least_squares",
+    "test_rig_and_memory", "test_relaxation", "test_patch", "test_experiments", "test_laws", "test_precompute",
+    "test_homogeneous", "test_force", "test_first", "test_motion", "test_energies_spectral",
+)  # fmt: skip
+
 SHARED = Path(os.environ.get("TISSUEJAX_SHARED", Path(__file__).resolve().parents[2] / "shared"))
 
 
@@ -36,6 +44,11 @@ def pytest_configure(config):
     os.environ |= {PROGRAMS: config.programs, "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.3"}
     jax.config.update("jax_compilation_cache_dir", config.programs)
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
+
+
+def pytest_collection_modifyitems(items):
+    order = {name: rank for rank, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: order.get(item.path.stem, len(order)))
 
 
 def pytest_collection_finish():

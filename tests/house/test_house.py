@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import tissuejax
-from tests.conftest import outside
+from tests.conftest import LONGEST, outside
 
 ROOT = Path(tissuejax.__file__).parent
 PROJECT = ROOT.parent
@@ -131,6 +131,10 @@ def test_a_constant_has_one_home_in_its_room(name):
                 homes.setdefault(constant, []).append(str(path.relative_to(ROOT)))
     twice = {c: files for c, files in homes.items() if len(files) > 1}
     assert not twice
+
+
+def test_the_longest_files_of_the_suite_are_there():
+    assert set(LONGEST) <= {p.stem for p in OURS}
 
 
 def test_no_vague_names():
