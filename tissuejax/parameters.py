@@ -7,7 +7,7 @@ path (`energy.mu`, `effects.friction.coefficient`) to a scalar, which is a JAX p
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from jaxtyping import Array, Float
 
@@ -16,7 +16,10 @@ from tissuejax.errors import InputError, unknown
 
 Values = Mapping[str, Float[Array, ""] | float]
 Number = TypeVar("Number")
-Constants = Mapping[str, Either]  # of a law, by name
+if TYPE_CHECKING:
+    Constants = Mapping[str, Array | Any]  # of a law, by name: numbers may come, formulas read them as arrays
+else:
+    Constants = Mapping[str, Either]
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 from tissuejax.cards.card import Card, number, row, rows
 from tissuejax.cards.material import POWERS, Material
+from tissuejax.energies.fibre import WithFibre
 from tissuejax.errors import InputError
 
 ABAQUS_MAX = 6  # terms of an Ogden or polynomial energy
@@ -40,7 +41,7 @@ class Abaqus(Card):
 
 def volume_of(subject: Material) -> str:
     """That of ABAQUS, which CalculiX shares: chains and fibres have one of their own."""
-    own = subject.energy.name == "arruda-boyce" or getattr(subject.energy, "families", 0)
+    own = subject.energy.name == "arruda-boyce" or subject.energy.families
     return LOGARITHMIC if own else POWERS
 
 
@@ -56,28 +57,21 @@ def hyperelastic(
         InputError: no card for this energy, or more terms than it takes.
     """
     tail = ", MODULI=INSTANTANEOUS" if moduli else ""
-    kind, terms = subject.energy.name, subject.polynomial()
+    kind, terms, pairs = subject.energy.name, subject.polynomial(), subject.ogden(card.ogden)
     order = getattr(subject.energy, "order", 1)
     limit = most_ogden if kind == "ogden" else most
     if order > limit:
         raise InputError(f"{card.name} takes {kind} up to order {limit}, this one has {order}; fit fewer terms")
-    if kind == "neo-hookean":
-        return [f"*HYPERELASTIC, NEO HOOKE{tail}", row([terms[1, 0], *subject.compressibilities(1)])]
-    if kind == "mooney-rivlin":
-        return [
-            f"*HYPERELASTIC, MOONEY-RIVLIN{tail}",
-            row([terms[1, 0], terms[0, 1], *subject.compressibilities(1)]),
-        ]
+    words = {"neo-hookean": "NEO HOOKE", "mooney-rivlin": "MOONEY-RIVLIN", "polynomial": f"POLYNOMIAL, N={order}"}
     if terms is not None:
-        word = "POLYNOMIAL" if kind == "polynomial" else "REDUCED POLYNOMIAL"
+        word = words.get(kind, f"REDUCED POLYNOMIAL, N={order}")
         D = subject.compressibilities(order)
         D += [unused] * (order - len(D))
-        return [f"*HYPERELASTIC, {word}, N={order}{tail}", *rows([*terms.values(), *D])]
-    if kind == "ogden":
+        return [f"*HYPERELASTIC, {word}{tail}", *rows([*terms.values(), *D])]
+    if pairs is not None:
         D = subject.compressibilities(order)
         D += [unused] * (order - len(D))
-        pairs = [x for pair in subject.ogden(card.ogden) for x in pair]
-        return [f"*HYPERELASTIC, OGDEN, N={order}{tail}", *rows([*pairs, *D])]
+        return [f"*HYPERELASTIC, OGDEN, N={order}{tail}", *rows([*(x for pair in pairs for x in pair), *D])]
     if kind == "arruda-boyce":
         D = subject.compressibilities(1)
         constants = [subject.constants["mu"], subject.constants["lambda_m"], *D]
@@ -85,14 +79,14 @@ def hyperelastic(
             f"*HYPERELASTIC, ARRUDA-BOYCE{tail}",
             row(constants),
         ]
-    if getattr(subject.energy, "families", 0) and not moduli and card.name == "abaqus" and neo_hookean(subject):
+    if subject.energy.families and not moduli and card.name == "abaqus" and neo_hookean(subject):
         return _fibres(subject)
     raise card.none(subject)
 
 
 def neo_hookean(subject: Material) -> bool:
     """Whether the matrix around the fibres is neo-Hookean."""
-    return getattr(subject.energy, "matrix", None) is None or subject.energy.matrix.name == "neo-hookean"
+    return not isinstance(subject.energy, WithFibre) or subject.energy.matrix.name == "neo-hookean"
 
 
 def _fibres(subject: Material) -> list[str]:

@@ -30,23 +30,21 @@ class Ansys(Card):
     def lines(self, subject: Material) -> list[str]:
         """TB and TBDATA commands of material 1."""
         body = [] if subject.density is None else [f"MP,DENS,1,{number(subject.density)}"]
-        kind, c, terms = subject.energy.name, subject.constants, subject.polynomial()
+        kind, c, terms, pairs = subject.energy.name, subject.constants, subject.polynomial(), subject.ogden(self.ogden)
         order = getattr(subject.energy, "order", 1)
         limit = ANSYS_OGDEN if kind == "ogden" else ANSYS_MAX
         if order > limit:
             raise InputError(f"this card takes {kind} up to order {limit}, this one has {order}; fit fewer terms")
         if kind == "neo-hookean":
             body += _table("TB,HYPER,1,1,2,NEO", [c["mu"], *subject.compressibilities(1)])
-        elif kind == "mooney-rivlin":
-            body += _table("TB,HYPER,1,1,2,MOONEY", [terms[1, 0], terms[0, 1], *subject.compressibilities(1)])
         elif terms is not None:
             D = subject.compressibilities(order)
-            option = "POLY" if kind == "polynomial" else "YEOH"
-            body += _table(f"TB,HYPER,1,1,{order},{option}", [*terms.values(), *D, *[0.0] * (order - len(D))])
-        elif kind == "ogden":
+            option = {"mooney-rivlin": "2,MOONEY", "polynomial": f"{order},POLY"}.get(kind, f"{order},YEOH")
+            body += _table(f"TB,HYPER,1,1,{option}", [*terms.values(), *D, *[0.0] * (order - len(D))])
+        elif pairs is not None:
             D = subject.compressibilities(order)
-            pairs = [x for pair in subject.ogden(self.ogden) for x in pair]
-            body += _table(f"TB,HYPER,1,1,{order},OGDEN", [*pairs, *D, *[0.0] * (order - len(D))])
+            flat = [x for pair in pairs for x in pair]
+            body += _table(f"TB,HYPER,1,1,{order},OGDEN", [*flat, *D, *[0.0] * (order - len(D))])
         elif kind in ("gent", "arruda-boyce"):
             option, second = ("GENT", c["Jm"]) if kind == "gent" else ("BOYCE", c["lambda_m"])
             body += _table(f"TB,HYPER,1,1,,{option}", [c["mu"], second, *subject.compressibilities(1)])

@@ -51,16 +51,15 @@ class Febio(Card):
         ]
 
     def _elastic(self, subject: Material) -> tuple[str, list[tuple[str, float]]]:
-        kind, c, terms = subject.energy.name, subject.constants, subject.polynomial()
+        kind, c, terms, pairs = subject.energy.name, subject.constants, subject.polynomial(), subject.ogden(self.ogden)
         order = getattr(subject.energy, "order", 1)
         if order > FEBIO_MAX:
             raise InputError(f"febio takes {kind} up to order {FEBIO_MAX}, this one has {order}; fit fewer terms")
-        if kind in ("neo-hookean", "mooney-rivlin") or (kind == "polynomial" and order == 1):
-            return "Mooney-Rivlin", [("c1", terms[1, 0]), ("c2", terms.get((0, 1), 0.0))]
-        if kind == "reduced-polynomial":
+        if terms is not None and kind == "reduced-polynomial":
             return "Yeoh", [(f"c{i}", terms[i, 0]) for i in range(1, order + 1)]
-        if kind == "ogden":
-            pairs = subject.ogden(self.ogden)
+        if terms is not None and set(terms) <= {(1, 0), (0, 1)}:
+            return "Mooney-Rivlin", [("c1", terms[1, 0]), ("c2", terms.get((0, 1), 0.0))]
+        if pairs is not None:
             return "Ogden", [
                 entry for i, (mu, alpha) in enumerate(pairs, 1) for entry in ((f"c{i}", mu), (f"m{i}", alpha))
             ]
@@ -70,7 +69,7 @@ class Febio(Card):
             return "Arruda-Boyce", [("mu", c["mu"]), ("N", c["lambda_m"] ** 2)]
         if kind == "gent":
             return "Gent", [("G", c["mu"]), ("Jm", c["Jm"])]
-        if getattr(subject.energy, "families", 0) == 2:
+        if subject.energy.families == 2:
             first, second = (float(a) for a in subject.energy.angles(c))
             if not math.isclose(first, -second, abs_tol=1e-9):
                 raise InputError(

@@ -46,8 +46,8 @@ class Lsdyna(Card):
                 "$ c10, c01, c11, c20, c02, c30",
                 ", ".join(number(terms.get(slot, 0.0)) for slot in SLOTS),
             ]
-        if subject.energy.name == "ogden":
-            pairs = subject.ogden(self.ogden)
+        pairs = subject.ogden(self.ogden)
+        if pairs is not None:
             if len(pairs) > LSDYNA_MAX:
                 raise InputError(f"ls-dyna takes {LSDYNA_MAX} Ogden terms, this one has {len(pairs)}; fit fewer")
             pairs += [(0.0, 0.0)] * (LSDYNA_MAX - len(pairs))

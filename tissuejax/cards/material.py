@@ -5,8 +5,10 @@ from dataclasses import dataclass, replace
 
 from tissuejax.energies.catalogue import name_of
 from tissuejax.energies.energy import Energy
-from tissuejax.energies.ogden import FORMS
-from tissuejax.energies.volumetric import Volumetric
+from tissuejax.energies.ogden import FORMS, Ogden
+from tissuejax.energies.polynomial import Polynomial
+from tissuejax.energies.reduced_polynomial import ReducedPolynomial
+from tissuejax.energies.volumetric import Compressibility, Volumetric
 from tissuejax.errors import InputError, unknown
 from tissuejax.model import Model
 from tissuejax.parameters import under
@@ -78,8 +80,9 @@ class Material:
 
     def penalty(self) -> tuple[float, str]:
         """A bulk modulus for solvers that need one, and the sentence that says where it comes from."""
-        if self.bulk_modulus is not None:
-            return self.bulk_modulus, f"bulk modulus K = {self.bulk_modulus:.6g}, {self.volumetric.formula}"
+        if self.volumetric is not None:
+            K = float(self.volumetric.bulk_modulus(self.bulk))
+            return K, f"bulk modulus K = {K:.6g}, {self.volumetric.formula}"
         K = PENALTY * self.shear_modulus
         return K, f"incompressible as fitted; K = {K:.6g} is a penalty of {PENALTY:g} shear moduli, not a measurement"
 
@@ -89,14 +92,13 @@ class Material:
         Raises:
             InputError: more terms than `most`.
         """
-        if self.volumetric is None:
-            return [0.0]
-        if self.volumetric.name == "compressibility":
+        if isinstance(self.volumetric, Compressibility):
             found = [float(self.bulk[f"D{i}"]) for i in range(1, self.volumetric.order + 1)]
             if len(found) > most:
                 raise InputError(f"{len(found)} compressibilities D_i; this card takes {most} with this energy")
             return found
-        return [2 / self.bulk_modulus]
+        K = self.bulk_modulus
+        return [0.0] if K is None else [2 / K]
 
     def volume_note(self, theirs: str) -> str:
         """A remark where the volumetric energy of the card is another function than the one fitted."""
@@ -106,8 +108,10 @@ class Material:
             f"fitted with U = {self.volumetric.formula}; card has U = {theirs}: same K, equal to first order in J - 1"
         )
 
-    def ogden(self, form: str) -> list[tuple[float, float]]:
-        """(mu_i, alpha_i) in the named form."""
+    def ogden(self, form: str) -> list[tuple[float, float]] | None:
+        """(mu_i, alpha_i) in the named form, or None for another kind of energy."""
+        if not isinstance(self.energy, Ogden):
+            return None
         own, theirs = FORMS[self.energy.form].factor, FORMS[form].factor
         found = []
         for i in range(1, self.energy.order + 1):
@@ -122,9 +126,9 @@ class Material:
             return {(1, 0): 0.5 * float(c["mu"])}
         if self.energy.name == "mooney-rivlin":
             return {(1, 0): float(c["C10"]), (0, 1): float(c["C01"])}
-        if self.energy.name == "polynomial":
+        if isinstance(self.energy, Polynomial):
             return {(i, j): float(c[f"C{i}{j}"]) for i, j in self.energy.exponents}
-        if self.energy.name == "reduced-polynomial":
+        if isinstance(self.energy, ReducedPolynomial):
             return {(i, 0): float(c[f"C{i}0"]) for i in range(1, self.energy.order + 1)}
         return None
 
@@ -208,7 +212,7 @@ def described(subject: Material) -> list[str]:
     """Lines for the head of every card: what it is, in which form and units."""
     e = subject.energy
     lines = [f"{subject.name}: {name_of(e)}, psi = {e.formula}", f"units {subject.units.names}"]
-    if hasattr(e, "form"):
+    if isinstance(e, Ogden):
         lines.append(f"fitted in Ogden form {e.form}")
     if subject.volumetric is None:
         lines.append("fitted as incompressible")

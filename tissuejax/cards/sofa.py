@@ -23,14 +23,14 @@ class Sofa(Card):
 
     def lines(self, subject: Material) -> list[str]:
         """One force field."""
-        kind, c, terms = subject.energy.name, subject.constants, subject.polynomial()
+        kind, c, terms, pairs = subject.energy.name, subject.constants, subject.polynomial(), subject.ogden(self.ogden)
         K, why = subject.penalty()
         if terms is not None and set(terms) <= {(1, 0), (0, 1)}:
             name, constants = "MooneyRivlin", [terms[1, 0], terms.get((0, 1), 0.0), K]
-        elif kind == "ogden" and subject.energy.order == 1:
-            name, constants = "Ogden", [*subject.ogden(self.ogden)[0], K]
-        elif kind == "ogden":
-            raise InputError(f"sofa takes one Ogden term, this material has {subject.energy.order}; fit ogden-1")
+        elif pairs is not None and len(pairs) == 1:
+            name, constants = "Ogden", [*pairs[0], K]
+        elif pairs is not None:
+            raise InputError(f"sofa takes one Ogden term, this material has {len(pairs)}; fit ogden-1")
         elif kind == "veronda-westmann":
             name, constants = "VerondaWestman", [c["C1"], c["C2"], K]
         else:

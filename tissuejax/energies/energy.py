@@ -17,6 +17,7 @@ class Energy(eqx.Module):
     name: ClassVar[str]
     formula: ClassVar[str]
     isotropic: ClassVar[bool] = True
+    families: ClassVar[int] = 0  # of fibres
     shear_modulus: ClassVar[str]  # at rest, as a formula in the parameters
     source: ClassVar[str]
     valid: ClassVar[str] = "all stretches"
@@ -37,3 +38,7 @@ class Energy(eqx.Module):
     def margin(self, p: Constants, strain: Strain) -> Float[Either, "..."]:
         """Positive inside the valid range of strains; energies that end somewhere say where."""
         return 1.0 + 0.0 * strain.J
+
+    def angles(self, p: Constants) -> tuple[Either, ...]:
+        """Direction of each family of fibres from axis 1 to 2, rad; none without fibres."""
+        return ()
