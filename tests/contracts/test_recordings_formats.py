@@ -61,8 +61,8 @@ def test_absent_file_and_folder(tmp_path):
 def test_identical_recordings_are_refused():
     one = recording("planar", np.random.default_rng(1))
     with pytest.raises(InputError, match="'x' and 'y'.*identical"):
-        checks.distinct({"x": one, "y": one})
-    checks.distinct({"x": one, "y": recording("planar", np.random.default_rng(2))})
+        checks.distinct([("x", one), ("y", one)])
+    checks.distinct([("x", one), ("y", recording("planar", np.random.default_rng(2)))])
     made = Sample("s", {"x": one, "y": one})
     with pytest.raises(InputError, match="identical data"):
         split(made)

@@ -31,6 +31,11 @@ BREACHES = {
     "size zero": (ROWS, UNI + '[specimen]\nheight = "0 mm"', ["specimen.height", "above zero"]),
     "size without unit": (ROWS, UNI + "[specimen]\nheight = 3", ["specimen.height", "no unit"]),
     "size unknown": (ROWS, UNI + '[specimen]\nhight = "3 mm"', ["'hight'", "'height'"]),
+    "sizes in no file": (
+        ROWS,
+        UNI + '[specimen]\nheight = { column = "h", unit = "mm" }\nfile = 3\nkey = "t"',
+        ["specimen", "file = 3", "names of a file"],
+    ),
     "noise negative": (ROWS, UNI + '[noise]\nnominal_stress = "-3 Pa"', ["noise.nominal_stress", "above zero"]),
     "noise zero": (ROWS, UNI + '[noise]\nnominal_stress = "0 Pa"', ["noise.nominal_stress", "above zero"]),
     "noise of what is not there": (ROWS, UNI + '[noise]\nforce = "3 N"', ["noise.force", "noise.nominal_stress"]),

@@ -43,7 +43,7 @@ def split(
     if not fitted:
         raise InputError(f"nothing is left to fit: all of {', '.join(sample.recordings)} are held out")
     held = tuple(n for n in sample.recordings if n in holdout)
-    distinct({n: sample.recordings[n] for n in (*fitted, *held)})
+    distinct((n, sample.recordings[n]) for n in dict.fromkeys((*fitted, *held)))
     return fitted, held
 
 

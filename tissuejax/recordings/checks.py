@@ -1,7 +1,7 @@
 """What every recording must satisfy, whichever format it came in; each refusal says where, what was found, what is
 expected."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 import numpy as np
 from jaxtyping import Float
@@ -105,18 +105,17 @@ def shorter(displacement: Float[np.ndarray, "n ..."], height: float, file: objec
         raise refusal(file, "specimen.height", f"{1e3 * height:.4g} mm", expected, advice)
 
 
-def distinct(recordings: Mapping[str, Recording] | Iterable[tuple[str, Recording]]) -> None:
+def distinct(recordings: Iterable[tuple[str, Recording]]) -> None:
     """Refuse two recordings with the same data, whatever their names: it would count one measurement twice.
 
     Args:
-        recordings: recordings by name, or pairs of a label (e.g. "file.h5: r1") and a recording.
+        recordings: pairs of a name or label (e.g. "file.h5: r1") and a recording.
 
     Raises:
         InputError: which two are the same.
     """
     seen: dict[tuple, str] = {}
-    pairs = recordings.items() if isinstance(recordings, Mapping) else recordings
-    for label, recording in pairs:
+    for label, recording in recordings:
         arrays = {f"inputs {k}": v for k, v in recording.inputs.items()}
         arrays |= {f"channels {k}": c.values for k, c in recording.channels.items()}
         arrays |= {f"attributes {k}": v for k, v in recording.attributes.items() if k != "start"}

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from datetime import date
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Shaped
 
 _CLOCK = re.compile(
     r"(?:(?P<date>\d{1,4}[-./]\d{1,2}[-./]\d{1,4})[T\s]\s*)?(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2}(?:[.,]\d+)?)"
@@ -14,7 +14,7 @@ _CLOCK = re.compile(
 DAY = 86400.0  # s
 
 
-def seconds(cells: Sequence[str]) -> Float[np.ndarray, " n"] | None:
+def seconds(cells: Sequence[str] | Shaped[np.ndarray, " n"]) -> Float[np.ndarray, " n"] | None:
     """Seconds from the first of the times of day, with a date before them or without; None where they are none.
 
     A date that stays the same doesn't matter; one that changes is read as year-month-day or day.month.year, and not
@@ -26,9 +26,12 @@ def seconds(cells: Sequence[str]) -> Float[np.ndarray, " n"] | None:
     if not any(filled) or any(f and m is None for f, m in zip(filled, found, strict=True)):
         return None
     dates = {m["date"] for m in found if m}
-    days = {text: 0 for text in dates} if len(dates) == 1 else {text: _day(text) for text in dates}
-    if None in days.values():
-        return None
+    days: dict[str | None, int] = {}
+    for text in dates:
+        day = 0 if len(dates) == 1 else _day(text)
+        if day is None:
+            return None
+        days[text] = day
     values = np.array([DAY * days[m["date"]] + _of_day(m) if m else np.nan for m in found])
     if dates == {None}:
         known = np.flatnonzero(filled)

@@ -7,6 +7,7 @@ The layouts of the experiment kinds are data in `layouts.py`; here is the engine
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 import h5py
 import numpy as np
@@ -14,12 +15,13 @@ import numpy as np
 from tissuejax.errors import InputError, unknown
 from tissuejax.recordings import checks
 from tissuejax.recordings.format import Format
-from tissuejax.recordings.hdf5_items import WHOLE, Source, attribute, plain, shape_text
+from tissuejax.recordings.hdf5_items import WHOLE, Holder, Source, attribute, path_of, plain, shape_text
 from tissuejax.recordings.layouts import CELL_NODES, LAYOUTS, NEEDS_GEOMETRY, Item, Scalar, layout, scalars
 from tissuejax.recordings.recording import Channel, Geometry, Recording, Sample
 
 MARK = "tissue-recording"
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
+Found = TypeVar("Found")
 
 
 class Hdf5(Format):
@@ -50,7 +52,7 @@ def read_labelled(path: Path, label: Path) -> Sample:
     return _with_file(path, label, _sample)
 
 
-def _with_file(path: Path, label: Path, use: Callable[[h5py.File, Source], object]):
+def _with_file(path: Path, label: Path, use: Callable[[h5py.File, Source], Found]) -> Found:
     try:
         with h5py.File(path, "r") as file:
             return use(file, Source(label))
@@ -105,7 +107,7 @@ def _refuse_links(group: h5py.Group, source: Source) -> None:
     """Refuse links and storage outside the file: a file that was sent could show other files of the reader's."""
     for name in group:
         link = group.get(name, getlink=True)
-        place = f"{group.name.rstrip('/')}/{name}"
+        place = f"{path_of(group).rstrip('/')}/{name}"
         if isinstance(link, h5py.ExternalLink):
             advice = "A recording file holds its own data: copy them in."
             raise source.refusal(place, f"a link to another file ({link.filename})", "data in this file", advice)
@@ -128,9 +130,9 @@ def _in_order(group: h5py.Group) -> list[str]:
     return sorted(group, key=lambda n: [int(p) if p.isdigit() else p for p in re.split(r"(\d+)", n)])
 
 
-def _recording(group: object, source: Source) -> Recording:
+def _recording(group: Holder | h5py.Datatype, source: Source) -> Recording:
     if not isinstance(group, h5py.Group):
-        raise source.refusal(group.name, "a dataset", "a group, one a recording")
+        raise source.refusal(path_of(group), "a dataset", "a group, one a recording")
     kind = source.required_text(group, "experiment", "the kind of experiment")
     if kind not in LAYOUTS:
         wrong = unknown("experiment kind", kind, LAYOUTS)
@@ -143,11 +145,11 @@ def _recording(group: object, source: Source) -> Recording:
     sizes: dict[str, int] = {}
     inputs, channels = {}, {}
     items = layout(kind)
-    read = {item.path: _item(group, item, sizes, source) for item in items}
+    read = {item.path: values for item in items if (values := _item(group, item, sizes, source)) is not None}
     for item in items:
-        values = read[item.path]
-        if values is None or item.role == "time":
+        if item.path not in read or item.role == "time":
             continue
+        values = read[item.path]
         noise = _noise(group, item, source)
         if item.role == "channel":
             channels[item.channel] = Channel(read[item.time], values, item.unit, noise)
@@ -161,11 +163,11 @@ def _recording(group: object, source: Source) -> Recording:
         value = _scalar(group, scalar, source)
         if value is not None:
             attributes[scalar.path] = value
-    return Recording(group.name.rsplit("/", 1)[-1], kind, times | inputs, channels, attributes)
+    return Recording(path_of(group).rsplit("/", 1)[-1], kind, times | inputs, channels, attributes)
 
 
 def _item(group: h5py.Group, item: Item, sizes: dict[str, int], source: Source) -> np.ndarray | None:
-    place = f"{group.name}/{item.path}"
+    place = f"{path_of(group)}/{item.path}"
     owner, _, leaf = item.path.rpartition("/")
     found = group.get(item.path)
     if found is None and item.role == "attribute" and owner in group:
@@ -191,7 +193,7 @@ def _noise(group: h5py.Group, item: Item, source: Source) -> float | None:
     if not item.noise:
         return None
     owner = item.path.rpartition("/")[0]
-    holders = [group[item.path], *([group[owner]] if owner else [])]
+    holders = [source.holder(group, path) for path in (item.path, owner) if path]
     for holder in holders:
         value = source.number(holder, "noise_std")
         if value is not None:
@@ -202,15 +204,20 @@ def _noise(group: h5py.Group, item: Item, source: Source) -> float | None:
 
 def _scalar(group: h5py.Group, scalar: Scalar, source: Source) -> float | None:
     """A number that is an attribute of its owner, or of a dataset in it, or a dataset of its own."""
-    owner = group.get(scalar.owner) if scalar.owner else group
-    inside = [d for d in owner.values() if isinstance(d, h5py.Dataset)] if scalar.owner and owner is not None else []
-    place = attribute(owner if owner is not None else group, scalar.name)
+    holders: list[Holder] = [group]
+    if scalar.owner and scalar.owner in group:
+        owner = source.holder(group, scalar.owner)
+        inside = owner.values() if isinstance(owner, h5py.Group) else ()
+        holders = [owner, *(d for d in inside if isinstance(d, h5py.Dataset))]
+    elif scalar.owner:
+        holders = []
+    place = attribute(holders[0] if holders else group, scalar.name)
     value = None
-    for holder in [h for h in (owner, *inside) if h is not None]:
+    for holder in holders:
         if scalar.name in holder.attrs:
             place, value = attribute(holder, scalar.name), source.number(holder, scalar.name)
     if value is None and isinstance(group.get(scalar.path), h5py.Dataset):
-        place = f"{group.name}/{scalar.path}"
+        place = f"{path_of(group)}/{scalar.path}"
         value = float(source.dataset(group, scalar.path, ()))
     if value is None:
         if scalar.optional:
@@ -229,7 +236,7 @@ def _geometry(file: h5py.File, source: Source) -> Geometry | None:
     points = source.dataset(group, "points", ("N", 3))
     cells = source.dataset(group, "cells", ("E", "k"), WHOLE)
     fixed = source.dataset(group, "fixed", ("F",), WHOLE)
-    kind = source.required_text(group["cells"], "cell_type", f"one of {', '.join(CELL_NODES)}")
+    kind = source.required_text(source.holder(group, "cells"), "cell_type", f"one of {', '.join(CELL_NODES)}")
     if CELL_NODES.get(kind) != cells.shape[1]:
         found = f"cell_type {kind!r} with {cells.shape[1]} nodes a cell"
         raise source.refusal("/geometry/cells", found, "'hexahedron' with 8 or 'tetra' with 4")

@@ -59,7 +59,7 @@ class Source:
 
     def dataset(self, group: h5py.Group, name: str, shape: tuple, kinds: str = NUMBERS) -> Shaped[np.ndarray, "..."]:
         """A required dataset of finite numbers, on its own."""
-        place = f"{group.name}/{name}"
+        place = f"{path_of(group)}/{name}"
         found = group.get(name)
         if not isinstance(found, h5py.Dataset):
             what = "nothing" if found is None else "a group"
@@ -67,6 +67,13 @@ class Source:
         values = self.array(place, found, shape, {}, kinds)
         checks.finite(values, self.label, place)
         return values
+
+    def holder(self, group: h5py.Group, name: str) -> Holder:
+        """A group or dataset that is there, for its attributes."""
+        found = group[name]
+        if isinstance(found, h5py.Datatype):
+            raise self.refusal(f"{path_of(group)}/{name}", "a named type", "a group or a dataset")
+        return found
 
     def text(self, holder: Holder, name: str) -> str | None:
         """A text attribute; None if it isn't there."""
@@ -96,9 +103,14 @@ class Source:
         return float(value.reshape(()))
 
 
+def path_of(item: Holder | h5py.Datatype) -> str:
+    """The HDF5 path of what was reached by one, as messages call it."""
+    return item.name or ""
+
+
 def attribute(holder: Holder, name: str) -> str:
     """How messages call an attribute."""
-    return f"{holder.name} attribute {name!r}"
+    return f"{path_of(holder)} attribute {name!r}"
 
 
 def plain(value: object) -> object:

@@ -14,7 +14,7 @@ def remarks(sample: Sample) -> list[str]:
     """Sentences on what is unusual and worth knowing before a fit; none where all is plain."""
     said = _weight(sample)
     try:
-        checks.distinct(sample.recordings)
+        checks.distinct(sample.recordings.items())
     except InputError as error:
         said.append(str(error))
     for name, recording in sample.recordings.items():

@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from tissuejax.errors import InputError
+from tissuejax.units import quantity
 
 HYSTERESIS = 0.1  # of the whole range: a turn smaller than that is noise, not the end of a cycle
 NEAR = 0.005  # of a cycle's range: this near to the peak counts as arrived, so that a noisy hold is not loading
@@ -191,25 +192,23 @@ def start_of(
     selection: Selection,
     motion: Float[np.ndarray, " n"],
     load: Float[np.ndarray, " n"],
-    preload: float | None,
-    toe: tuple[float, float] | None,
     place: str,
-    unit: str = "",
-) -> tuple[int, float | None, list[str]]:
+    unit: str,
+) -> tuple[int, float, list[str]]:
     """First row kept, and the reading of the deformation that counts as none.
 
     Args:
         selection: what was asked for.
         motion, load: of the rows kept so far.
-        preload, toe: loads in the unit of `load`.
         place: for messages.
-        unit: of `load`, for messages.
+        unit: SI, of `load`.
 
     Raises:
         InputError: a preload that is never reached, or a toe range with fewer than three rows or no slope.
     """
-    size, first, zero, notes = np.abs(load), 0, None, []
-    if preload is not None:
+    size, first, zero, notes = np.abs(load), 0, 0.0, []
+    if selection.preload:
+        preload = quantity(selection.preload, unit, "preload")
         over = np.flatnonzero(size >= preload)
         if not len(over):
             raise InputError(
@@ -224,8 +223,8 @@ def start_of(
         notes.append(
             f"Deformation counts from the preload of {selection.preload}; {first} rows before it are left out."
         )
-    if toe is not None:
-        low, high = sorted(toe)
+    if selection.toe is not None:
+        low, high = sorted(quantity(t, unit, "toe") for t in selection.toe)
         end = int(np.argmax(size)) + 1
         inside = np.flatnonzero((size[:end] >= low) & (size[:end] <= high))
         if len(inside) < 3:

@@ -1,10 +1,10 @@
 """The TOML side file that describes a lab's own table; parsed and checked here, carried out in `table.py`."""
 
-import functools
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 from tissuejax.errors import InputError, unknown
 from tissuejax.recordings.cutting_table import Setup, setup_from
@@ -61,6 +61,7 @@ PART = (
 # fmt: on
 READING = ("separator", "decimal", "comment", "skip", "header", "units_row", "format")
 OF_SAMPLE = ("part", "source", "notes", "density")
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class Lookup:
     """A second table that gives specimen sizes by a key column (one row a specimen)."""
 
     file: str
-    key: str
+    key: str | int
 
 
 @dataclass(frozen=True)
@@ -160,15 +161,18 @@ def parse(path: Path) -> SideFile:
 
 def _merged(shared: Mapping[str, object], own: Mapping[str, object]) -> dict[str, object]:
     """A part's own keys over the shared ones; tables are merged key by key."""
-    both = {
-        k: {**shared[k], **v} if isinstance(v, dict) and isinstance(shared.get(k), dict) else v for k, v in own.items()
-    }
-    return {**shared, **both}
+    both = dict(shared)
+    for key, value in own.items():
+        before = shared.get(key)
+        both[key] = {**before, **value} if isinstance(value, dict) and isinstance(before, dict) else value
+    return both
 
 
-def _typed(table: Mapping[str, object], key: str, kind: type, default: object) -> object:
-    value = table.get(key, default)
-    if key in table and (not isinstance(value, kind) or (kind is int and isinstance(value, bool))):
+def _typed(table: Mapping[str, object], key: str, kind: type[Value], default: Value) -> Value:
+    if key not in table:
+        return default
+    value = table[key]
+    if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
         raise InputError(f"{key}: found {value!r}, expected {'a table' if kind is dict else f'a {kind.__name__}'}")
     return value
 
@@ -180,14 +184,22 @@ def _part(table: Mapping[str, object]) -> Part:
     for key in ("file", "experiment", "columns"):
         if key not in table:
             raise InputError(f"{key}: found nothing, expected {_EXAMPLES[key]}")
-    get = functools.partial(_typed, table)
+
+    def get(key: str, kind: type[Value], default: Value) -> Value:
+        return _typed(table, key, kind, default)
+
     experiment, sense = experiment_of(get("experiment", str, ""))
     specimen = _in_our_words(get("specimen", dict, {}), SIZE_WORDS, SPECIMEN_UNITS, "specimen")
     lookup = None
     if "file" in specimen or "key" in specimen:
         if not {"file", "key"} <= specimen.keys():
             raise InputError('specimen: expected both file = "sizes.csv" and key = "the column that names the test"')
-        lookup = Lookup(specimen.pop("file"), specimen.pop("key"))
+        file, key = specimen.pop("file"), specimen.pop("key")
+        if not isinstance(file, str) or not isinstance(key, str | int):
+            raise InputError(
+                f"specimen: found file = {file!r} and key = {key!r}, expected the names of a file and a column"
+            )
+        lookup = Lookup(file, key)
     lowpass, cut = table.get("lowpass"), None
     if experiment == "cutting":
         cut = setup_from(get("tissue", dict, {}), get("blade", dict, {}))
@@ -203,7 +215,7 @@ def _part(table: Mapping[str, object]) -> Part:
         sample=get("sample", str, "sample"),
         recording=get("recording", str, "r1"),
         where=get("where", dict, {}),
-        positive=_choice({"positive": sense or "tension"} | table, "positive", ("tension", "compression")),
+        positive=_choice({"positive": sense or "tension", **table}, "positive", ("tension", "compression")),
         specimen={k: _size(k, v) for k, v in specimen.items()},
         lookup=lookup,
         noise={
@@ -268,12 +280,12 @@ def _direction(name: str, value: object) -> tuple[float, float, float] | None:
     if value is None:
         return None
     numbers = isinstance(value, list) and all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
-    length = sum(v * v for v in value) ** 0.5 if numbers else 0.0
-    if not numbers or len(value) != 3 or not 0 < length < float("inf"):
-        raise InputError(
-            f"{name}: found {value!r}, expected three numbers, such as [1, 0, 0], in the tissue's own frame"
-        )
-    return tuple(v / length for v in value)
+    if isinstance(value, list) and numbers and len(value) == 3:
+        x, y, z = value
+        length = sum(v * v for v in value) ** 0.5
+        if 0 < length < float("inf"):
+            return x / length, y / length, z / length
+    raise InputError(f"{name}: found {value!r}, expected three numbers, such as [1, 0, 0], in the tissue's own frame")
 
 
 _EXAMPLES = {
@@ -285,7 +297,7 @@ _EXAMPLES = {
 
 def _choice(table: Mapping[str, object], key: str, allowed: tuple[str, ...]) -> str:
     value = table.get(key, allowed[0])
-    if value not in allowed:
+    if not isinstance(value, str) or value not in allowed:
         raise InputError(f"{key}: found {value!r}, expected {' or '.join(repr(a) for a in allowed)}")
     return value
 
@@ -355,7 +367,9 @@ def _noise(name: str, value: object) -> str | Column:
 
 
 def _numbers(table: Mapping[str, object]) -> dict[str, float]:
+    found = {}
     for name, value in table.items():
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise InputError(f"attributes.{name}: found {value!r}, expected a number in SI")
-    return {name: float(value) for name, value in table.items()}
+        found[name] = float(value)
+    return found

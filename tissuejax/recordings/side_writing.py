@@ -1,7 +1,7 @@
 """Side files as text: what was guessed of a table, or a template for a kind of test, each line with its comment."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from tissuejax.errors import InputError
 from tissuejax.recordings.exports.meanings import EXPERIMENT_WORDS
@@ -150,7 +150,7 @@ def _noise(guess: Guess) -> list[str]:
     ]
 
 
-def _inline(table: dict) -> str:
+def _inline(table: Mapping[str, object]) -> str:
     pairs = ", ".join(f"{json.dumps(k, ensure_ascii=False)} = {json.dumps(v)}" for k, v in table.items())
     return f"{{ {pairs} }}"
 

@@ -45,9 +45,8 @@ def recording_from(
     if len(rows) < 2:
         raise checks.refusal(place, "rows", f"{len(rows)} sample(s)", "at least 2 to be looked at, and 3 to be fitted")
     timed = "time" in values
-    time = values.pop("time", None)
+    time = values.pop("time", np.arange(len(rows), dtype=float))
     if not timed:
-        time = np.arange(len(rows), dtype=float)
         notes.append(NO_TIME)
     checks.increasing(time, place, f"column {part.columns['time'][0].column!r}" if timed else "time")
     if part.lowpass is not None:
@@ -64,7 +63,7 @@ def recording_from(
     keep = slice(None, None, part.every)
     time, values = time[keep], {q: v[keep] for q, v in values.items()}
     given = {k: sizes[k] for k in ("height", "diameter") if k in sizes}
-    attributes = dict(part.attributes) | given
+    attributes: dict[str, float | np.ndarray] = {**part.attributes, **given}
     if part.direction is not None:
         attributes["direction"] = np.array(part.direction)
     if part.normal is not None:
@@ -77,9 +76,10 @@ def recording_from(
     if part.experiment == "probing":
         return _probing(part, time, values, kinematic, load, sizes, name, place, attributes), notes
     motion = _motion(part, values[kinematic], kinematic, sizes, place)
-    if load == "force":
-        attributes["area"] = _area(sizes, place)
-    stress, per_unit = _stress(values[load], load, motion, attributes.get("area"), part, place)
+    area = _area(sizes, place) if load == "force" else None
+    if area is not None:
+        attributes["area"] = area
+    stress, per_unit = _stress(values[load], load, motion, area, part, place)
     abscissa = time if timed else convert.path_length(motion)
     noise = _noise(part, load, columns, rows, per_unit, abscissa, stress)
     key = "shear" if part.experiment == "simple-shear" else "stretch"
@@ -181,10 +181,7 @@ def selected(part: Part, values: Mapping[str, np.ndarray], kinematic: str, load:
         return Kept(rows, {q: v[rows] for q, v in values.items()}, sizes, notes)
     if values[kinematic].ndim != 1:
         raise checks.refusal(place, "preload, toe", "a biaxial test", "a test with one load: cut the rows by `where`")
-    si = QUANTITIES[load]
-    preload = quantity(rule.preload, si, "preload") if rule.preload else None
-    toe = tuple(quantity(t, si, "toe") for t in rule.toe) if rule.toe else None
-    first, zero, said = start_of(rule, values[kinematic][rows], values[load][rows], preload, toe, place, si)
+    first, zero, said = start_of(rule, values[kinematic][rows], values[load][rows], place, QUANTITIES[load])
     rows = rows[first:]
     if len(rows) < 2:
         raise checks.refusal(
@@ -195,7 +192,7 @@ def selected(part: Part, values: Mapping[str, np.ndarray], kinematic: str, load:
         sizes = {**sizes, "height": zero}
     else:
         left[kinematic] = _from_zero(left[kinematic], kinematic, zero)
-    return Kept(rows, left, sizes, notes + said, float(zero))
+    return Kept(rows, left, sizes, notes + said, zero)
 
 
 def _from_zero(values: np.ndarray, kind: str, zero: float) -> np.ndarray:
@@ -295,10 +292,10 @@ def _area(sizes: Sizes, place: str) -> float:
 def _stress(
     values: np.ndarray, kind: str, motion: np.ndarray, area: float | None, part: Part, place: str
 ) -> tuple[np.ndarray, float]:
-    """Nominal stress, and what one unit of the measured quantity is in it (for noise)."""
+    """Nominal stress, and what one unit of the measured quantity is in it (for noise); a force comes with its area."""
     if values.ndim != motion.ndim:
         raise checks.refusal(place, "columns", f"{values.ndim} axes of {kind}", f"{motion.ndim}, as of the deformation")
-    if kind == "force":
+    if area is not None:
         return convert.nominal_from_force(values, area), 1.0 / area
     # In simple shear the shear components of Cauchy and nominal stress are the same: P12 = sigma12.
     if kind == "true_stress" and part.experiment != "simple-shear":
@@ -348,7 +345,7 @@ def _probing(
     sizes: Sizes,
     name: str,
     place: str,
-    attributes: dict[str, float],
+    attributes: dict[str, float | np.ndarray],
 ) -> Recording:
     """A tip pressed straight down: displacement into the sample and the force that pushes back, both positive.
 

@@ -49,10 +49,11 @@ class Agilent(TableExport):
 
 def _sheets(path: Path) -> list:
     import xlrd
+    from xlrd.biffh import XLRDError
 
     try:
-        book = xlrd.open_workbook(path)
-    except (xlrd.XLRDError, OSError, IndexError, AssertionError, ValueError, KeyError):
+        book = xlrd.open_workbook(str(path))
+    except (XLRDError, OSError, IndexError, AssertionError, ValueError, KeyError):
         return []
     found = [s for s in book.sheets() if re.fullmatch(r"Test\s*\d+", s.name.strip()) and s.nrows > 2]
     return sorted(found, key=lambda s: s.name)

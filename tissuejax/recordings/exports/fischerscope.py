@@ -40,7 +40,7 @@ class FischerScope(TableExport):
         numbers = [re.search(r"Value\s*:\s*(\d+)", line) for line in lines]
         names = []
         for k, table in enumerate(tables):
-            numbered = [numbers[i][1] for i in range(table.above, table.first) if numbers[i]]
+            numbered = [m[1] for m in numbers[table.above : table.first] if m]
             names.append(numbered[-1] if numbered else str(k + 1))
         assumed = ["force is in mN, depth in um and time in s, which the names of the columns don't say"]
         key_lines = [line for line in lines[:12] if re.match(r"[A-Za-z]", line)]

@@ -34,15 +34,11 @@ class Mach1(TableExport):
         """Each data block under the name of its test, with a count where one comes again."""
         lines = text_lines(path)
         whole = text.understood(lines, "\t", ".")
-        tables = [t for t in whole.tables if t.names_at is not None]
+        tables = [(t, t.names_at) for t in whole.tables if t.names_at is not None]
         names: list[str] = []
-        for table in tables:
-            tags = [
-                m[1]
-                for i in range(table.above, table.names_at)
-                if (m := re.match(r"<(?!DATA|END|INFO)(.+)>", lines[i]))
-            ]
+        for table, names_at in tables:
+            tags = [m[1] for i in range(table.above, names_at) if (m := re.match(r"<(?!DATA|END|INFO)(.+)>", lines[i]))]
             name = tags[-1] if tags else "data"
             names.append(f"{len(names) + 1} {name}")
-        top = tables[0].names_at if tables else len(lines)
-        return stacked(path, tables, text.header(lines[:top], "\t"), names)
+        top = tables[0][1] if tables else len(lines)
+        return stacked(path, [t for t, _ in tables], text.header(lines[:top], "\t"), names)

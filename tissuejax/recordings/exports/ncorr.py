@@ -42,6 +42,8 @@ class Ncorr(MarkerExport):
         try:
             with h5py.File(path, "r") as file:
                 group = file[_GROUP]
+                if not isinstance(group, h5py.Group):
+                    raise TypeError(f"{_GROUP} is no group")
                 images = int(np.asarray(group["nImages"])[0, 0])
                 camera = int(np.asarray(group["nCamRef"])[0, 0])
                 references = np.asarray(group["Points"]).ravel()[:images]

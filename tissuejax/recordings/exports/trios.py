@@ -36,13 +36,13 @@ class Trios(TableExport):
         """Each step as a block by its name; key lines of all sections as header (geometry, gap, instrument)."""
         lines = text_lines(path)
         whole = text.understood(lines, "\t", ".")
-        steps = [t for t in whole.tables if t.names_at is not None]
-        names = [_step(lines, t.names_at, k) for k, t in enumerate(steps)]
-        top = steps[0].names_at if steps else len(lines)
+        steps = [(t, t.names_at) for t in whole.tables if t.names_at is not None]
+        names = [_step(lines, names_at, k) for k, (_, names_at) in enumerate(steps)]
+        top = steps[0][1] if steps else len(lines)
         assumed = [
             "shear stress and strain at the rim are taken as those of the whole specimen, as the machine gives them"
         ]
-        return stacked(path, steps, text.header(lines[:top], "\t"), names, assumed)
+        return stacked(path, [t for t, _ in steps], text.header(lines[:top], "\t"), names, assumed)
 
 
 def _step(lines: list[str], names_at: int, k: int) -> str:
