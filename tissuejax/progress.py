@@ -10,7 +10,7 @@ import abc
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 
 class Stage(abc.ABC):
@@ -25,7 +25,7 @@ class Progress(abc.ABC):
     """Where a computation reports how far it is."""
 
     @abc.abstractmethod
-    def stage(self, description: str, total: int | None = None):
+    def stage(self, description: str, total: int | None = None) -> AbstractContextManager[Stage]:
         """A context manager giving a `Stage` of `total` steps (None where the number is not known)."""
 
 

@@ -16,7 +16,7 @@ import pytest
 from tests.cohorts import SETTINGS, STRETCH, cohort
 from tests.specimens import recording
 from tissuejax.campaign.child import Child
-from tissuejax.campaign.dask import quiet
+from tissuejax.campaign.cluster import quiet
 from tissuejax.campaign.run import begin, go_on, status, table
 from tissuejax.campaign.store import Store
 from tissuejax.campaign.task import Settings, TooLong, limited
@@ -123,11 +123,11 @@ def test_a_case_that_does_not_stop_is_killed_and_the_next_one_runs():
     child = Child(sleeping)
     try:
         assert child.answer("", {"sample": "a"}, 30, 0) == {"sample": "a"}
-        first = child.process.pid
+        first = child.running.process.pid
         assert child.answer("", {"sample": "deaf"}, 0.05, 0.05) is None
         assert child.answer("", {"sample": "dead"}, 30, 0) is None
         assert child.answer("", {"sample": "b"}, 30, 0) == {"sample": "b"}
-        assert child.process.pid != first
+        assert child.running.process.pid != first
     finally:
         child.end()
 

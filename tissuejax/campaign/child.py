@@ -8,11 +8,36 @@ import multiprocessing
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from multiprocessing.process import BaseProcess
+from typing import Any, NamedTuple, Protocol
 
 GRACE = 30.0  # s beyond the limit until a case that does not stop is killed
 
 Work = Callable[[str, dict[str, Any]], dict[str, Any]]
+
+
+class Pipe(Protocol):
+    """One end of a pipe, of the kind that the system has."""
+
+    def send(self, obj: Any, /) -> None:
+        """Pickle it to the other end."""
+
+    def recv(self) -> Any:
+        """What the other end sent next; waits for it."""
+
+    def poll(self, timeout: float | None = 0.0) -> bool:
+        """Whether something can be received within so many seconds."""
+        ...
+
+    def close(self) -> None:
+        """No more is sent or received."""
+
+
+class Running(NamedTuple):
+    """A process that answers, and the pipe to it."""
+
+    process: BaseProcess
+    pipe: Pipe
 
 
 class Child:
@@ -20,21 +45,24 @@ class Child:
 
     Attributes:
         work: what it does with (folder, task); a function of a module.
+        running: the process; None before the first case and where the last was killed.
     """
 
     def __init__(self, work: Work):
-        self.work, self.process, self.pipe = work, None, None
+        self.work = work
+        self.running: Running | None = None
         self.busy = threading.Lock()
 
     def answer(self, folder: str, task: dict[str, Any], limit: float, grace: float = GRACE) -> dict[str, Any] | None:
         """What the work gives, or None where it had to be killed or died."""
         with self.busy:
-            if self.process is None or not self.process.is_alive():
-                self._begin()
+            if self.running is None or not self.running.process.is_alive():
+                self.running = _begun(self.work)
+            pipe = self.running.pipe
             try:
-                self.pipe.send((folder, task))
-                if self.pipe.poll(limit + grace):
-                    return self.pipe.recv()
+                pipe.send((folder, task))
+                if pipe.poll(limit + grace):
+                    return pipe.recv()
             except (EOFError, OSError):
                 pass
             self.end()
@@ -42,21 +70,23 @@ class Child:
 
     def end(self) -> None:
         """Kill the process."""
-        if self.process is not None:
-            self.process.kill()
-            self.process.join()
-            self.pipe.close()
-            self.process = None
-
-    def _begin(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=_serve, args=(theirs, self.work), daemon=True)
-        self.process.start()
-        theirs.close()
+        if self.running is not None:
+            self.running.process.kill()
+            self.running.process.join()
+            self.running.pipe.close()
+            self.running = None
 
 
-def _serve(pipe, work: Work) -> None:
+def _begun(work: Work) -> Running:
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_serve, args=(theirs, work), daemon=True)
+    process.start()
+    theirs.close()
+    return Running(process, ours)
+
+
+def _serve(pipe: Pipe, work: Work) -> None:
     """Answer until the parent is gone."""
     with suppress(EOFError, OSError, KeyboardInterrupt):
         while True:

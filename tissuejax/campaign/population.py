@@ -183,7 +183,9 @@ def estimates(rows: Mapping[str, dict], groups: Mapping[str, str] | None = None)
     doubts = ([why for of_kind in r.get("suspect", {}).values() for why in of_kind] for r in used.values())
     suspect = tuple("; ".join(said) for said in doubts)
     left_out = tuple(name for name in rows if name not in used)
-    return Estimates(tuple(used), paths, values, covariance, (values > 0).all(0), labels, units, suspect, left_out)
+    return Estimates(
+        tuple(used), paths, values, covariance, np.all(values > 0, axis=0), labels, units, suspect, left_out
+    )
 
 
 def pooled(of: Estimates) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
@@ -207,11 +209,11 @@ def population(
         InputError: numpyro is missing.
     """
     x, S = of.working
-    seen = np.ones(len(x), bool) if seen is None else np.asarray(seen, bool)
+    taking = np.ones(len(x), bool) if seen is None else np.asarray(seen, bool)
     # one unit for all: parameters differ by orders of magnitude
-    centre, size = x[seen].mean(0), np.maximum(x[seen].std(0, ddof=1), 1e-9)
+    centre, size = x[taking].mean(0), np.maximum(x[taking].std(0, ddof=1), 1e-9)
     runner = runner or Runner(len(of.labels), draws, warmup, chains)
-    drawn = runner((x - centre) / size, S / np.outer(size, size), of.group, seen, seed)
+    drawn = runner((x - centre) / size, S / np.outer(size, size), of.group, taking, seed)
     scale = np.outer(size, size)
     return Population(
         of,

@@ -212,10 +212,11 @@ def _solved(task: Task) -> dict[str, Any]:
         asked[k] = {path: float(of[0]) if len(of) == 1 else tuple(map(float, of)) for path, *of in asked[k]}
     fitted, held = split(sample, tuple(n for n in asked.pop("only", ()) if n in sample.recordings), held)
     refuse_unusable(sample, fitted)
-    unknowns, objective, search = (
-        kind(**{f.name: asked[f.name] for f in fields(kind) if f.name in asked})
-        for kind in (Unknowns, Objective, Search)
-    )
+
+    def given(kind: type[Unknowns | Objective | Search]) -> dict[str, Any]:
+        return {f.name: asked[f.name] for f in fields(kind) if f.name in asked}
+
+    unknowns, objective, search = Unknowns(**given(Unknowns)), Objective(**given(Objective)), Search(**given(Search))
     posed = problem(predictor(model, sample, fitted), unknowns, objective)
     start = {path: posed.start[path] for path in unknowns.start or ()} or None
     search = replace(search, multistart=s.multistart, seed=s.seed)
