@@ -1,7 +1,7 @@
 """What every recording must satisfy, whichever format it came in; each refusal says where, what was found, what is
 expected."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from jaxtyping import Float
