@@ -29,10 +29,12 @@ PROGRAMS = "JAX_COMPILATION_CACHE_DIR"
 
 # Files that take a worker longest, the longest first: begun late, one of them would keep one core alone in the end.
 LONGEST = (
-    "test_lanes", "test_cli", "test_notebooks", "test_gradients", "test_doors", "test_effects", "test_predictor",
-    "test_fit_small", "test_probing_bench", "test_refusals", "test_recordings_real", "test_least_squares",
-    "test_rig_and_memory", "test_relaxation", "test_patch", "test_experiments", "test_laws", "test_precompute",
-    "test_homogeneous", "test_force", "test_first", "test_motion", "test_energies_spectral",
+    "test_lanes", "test_cli", "test_notebooks", "test_gradients", "test_doors", "test_effects", "test_clock",
+    "test_predictor", "test_probing_bench", "test_refusals", "test_fit_small", "test_recordings_real",
+    "test_least_squares", "test_at_once", "test_rig_and_memory", "test_rig_faults", "test_relaxation", "test_pressed",
+    "test_patch", "test_swallowed", "test_statics", "test_recipe", "test_motion", "test_probing_diagnosis",
+    "test_experiments", "test_laws", "test_precompute", "test_blade_run", "test_noise_terms", "test_homogeneous",
+    "test_next_probing", "test_force", "test_first",
 )  # fmt: skip
 
 SHARED = Path(os.environ.get("TISSUEJAX_SHARED", Path(__file__).resolve().parents[2] / "shared"))
