@@ -16,7 +16,8 @@ VISIBLE = 3.0
 BEGIN, END = "<!-- pooled: written by the study -->", "<!-- end of pooled -->"
 CURRENT = {
     "material": ("material", "material-second", "material-third", "material-fourth", "material-fifth",
-                 "material-sixth", "material-seventh", "material-eighth", "material-ninth"),
+                 "material-sixth", "material-seventh", "material-eighth", "material-ninth",
+                 "material-tenth"),
     "probing": ("probing", "probing-strong", "probing-strong-second", "probing-pairs", "probing-second",
                 "probing-strong-third", "probing-third", "probing-fourth"),
 }  # fmt: skip
