@@ -269,7 +269,7 @@ def _model(groups: int, several: bool):
     from numpyro import distributions as dist
 
     def root(sd: str, correlation: str, p: int):
-        size = numpyro.sample(sd, dist.HalfNormal(WIDE).expand([p]).to_event(1))
+        size = jnp.asarray(numpyro.sample(sd, dist.HalfNormal(WIDE).expand([p]).to_event(1)))
         if p == 1:
             return size[:, None] * numpyro.deterministic(correlation, jnp.ones((1, 1)))
         return size[:, None] * numpyro.sample(correlation, dist.LKJCholesky(p, 2.0))
