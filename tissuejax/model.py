@@ -11,7 +11,7 @@ from tissuejax.effects.effect import Effect
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.volumetric import Volumetric
 from tissuejax.errors import InputError
-from tissuejax.parameters import Parameter, prefixed, under
+from tissuejax.parameters import Constants, Parameter, prefixed, under
 
 
 class Model(eqx.Module):
@@ -68,7 +68,7 @@ class Model(eqx.Module):
         """False if the strain energy knows a direction."""
         return all(part.isotropic for part in (self.energy, *self.effects))
 
-    def active(self, values: Mapping[str, float], wanted: Collection[str] = ()) -> "Model":
+    def active(self, values: Constants, wanted: Collection[str] = ()) -> "Model":
         """Without effects whose amplitudes are all exactly zero: they change no bit, and so cost nothing.
 
         Args:

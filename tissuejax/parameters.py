@@ -7,19 +7,16 @@ path (`energy.mu`, `effects.friction.coefficient`) to a scalar, which is a JAX p
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TypeVar
 
 from jaxtyping import Array, Float
 
-from tissuejax.arrays import Either
+from tissuejax.arrays import Given
 from tissuejax.errors import InputError, unknown
 
 Values = Mapping[str, Float[Array, ""] | float]
 Number = TypeVar("Number")
-if TYPE_CHECKING:
-    Constants = Mapping[str, Array | Any]  # of a law, by name: numbers may come, formulas read them as arrays
-else:
-    Constants = Mapping[str, Either]
+Constants = Mapping[str, Given]  # of a law, by name
 
 
 @dataclass(frozen=True)

@@ -152,14 +152,17 @@ class Effect(eqx.Module):
         """Nominal stress as reported, from the specimen's own."""
         return stress
 
-    def scene(self, p: Mapping[str, Array], test: ProbingTest, scene: Scene) -> Scene:
-        """The probing scene with this effect in it (see `tled/scene.py`)."""
+    def scene(self, p: Mapping[str, Array], test: ProbingTest | None, scene: Scene) -> Scene:
+        """The scene with this effect in it (see `tled/scene.py`); `test` is None for that of a cut."""
         return scene
 
     def channels(
-        self, p: Mapping[str, Array], test: ProbingTest, channels: Mapping[str, Channel]
+        self, p: Mapping[str, Array], test: ProbingTest | None, channels: Mapping[str, Channel]
     ) -> Mapping[str, Channel]:
-        """Probing channels ("force", "markers") as the sensors report them, from the true series on a fine clock."""
+        """Channels ("force", "markers") as the sensors report them, from the true series on a fine clock.
+
+        `test` is None for a cut, whose channel is "cutting_force".
+        """
         return channels
 
     def cut(self, p: Mapping[str, Array], cut: Cut) -> Cut:

@@ -8,6 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from tissuejax.arrays import Given
 from tissuejax.tensors import Sym
 
 
@@ -25,16 +26,16 @@ class MaterialTest(eqx.Module):
         mode: "extension" (one stretch), "biaxial" (two) or "shear".
     """
 
-    time: Float[Array, " n"]
-    drive: Float[Array, "n ..."]
-    second: Float[Array, ""]
-    swell: Float[Array, ""]
-    axial: Float[Array, ""]
-    start: Float[Array, ""]
-    area: Float[Array, ""]
-    height: Float[Array, ""]
-    diameter: Float[Array, ""]
-    frame: Float[Array, "3 3"]
+    time: Float[Given, " n"]
+    drive: Float[Given, "n ..."]
+    second: Float[Given, ""]
+    swell: Float[Given, ""]
+    axial: Float[Given, ""]
+    start: Float[Given, ""]
+    area: Float[Given, ""]
+    height: Float[Given, ""]
+    diameter: Float[Given, ""]
+    frame: Float[Given, "3 3"]
     mode: str = eqx.field(static=True)
 
     @property
@@ -59,9 +60,9 @@ class Stress(eqx.Module):
     """
 
     S: Sym
-    W: Float[Array, " n"]
+    W: Float[Given, " n"]
     C: Sym
-    spherical: Float[Array, " n"]
+    spherical: Float[Given, " n"]
 
     def scaled(self, factor: Float[Array, " n"]) -> "Stress":
         """With the stress multiplied at every time; energy and strain stay."""

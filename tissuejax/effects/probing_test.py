@@ -1,7 +1,9 @@
 """A probing as effects see it: what they need to know beyond the scene they change."""
 
 import equinox as eqx
-from jaxtyping import Array, Float
+from jaxtyping import Float
+
+from tissuejax.arrays import Given
 
 
 class ProbingTest(eqx.Module):
@@ -17,10 +19,10 @@ class ProbingTest(eqx.Module):
         rest: rest positions of the markers, m.
     """
 
-    start: Float[Array, ""]
-    centres: Float[Array, "E 3"]
-    mass: Float[Array, " E"]
-    below_top: Float[Array, " N"]
-    height: Float[Array, ""]
-    first_touch: Float[Array, ""]
-    rest: Float[Array, "k 3"]
+    start: Float[Given, ""]
+    centres: Float[Given, "E 3"]
+    mass: Float[Given, " E"]
+    below_top: Float[Given, " N"]
+    height: Float[Given, ""]
+    first_touch: Float[Given, ""]
+    rest: Float[Given, "k 3"]

@@ -21,6 +21,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from tissuejax.arrays import Given
 from tissuejax.effects.cutting_test import Cut
 from tissuejax.errors import InputError
 from tissuejax.experiments.cutting_layers import ages, layer, relaxed
@@ -65,7 +66,7 @@ def met(model: Model, values: Mapping[str, Array], path: Path, at, pace, elapsed
 
 
 def balance_force(
-    model: Model, values: Mapping[str, Array], path: Path, since: Float[Array, "n s"] | None = None
+    model: Model, values: Mapping[str, Array], path: Path, since: Float[Given, "n s"] | None = None
 ) -> Float[Array, " n"]:
     """Force against the motion at the times of the path, N, by the balance of energies. Pure JAX, of the path too.
 

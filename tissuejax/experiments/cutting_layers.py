@@ -23,6 +23,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from tissuejax.arrays import Given
 from tissuejax.energies.strain import Strain
 from tissuejax.experiments.cutting_record import Path
 from tissuejax.model import Model
@@ -41,7 +42,7 @@ class Layers(NamedTuple):
     isochoric: tuple[Array, Array]
 
 
-def layer(model: Model, values: Mapping[str, Array], half: float, thickness) -> Layers:
+def layer(model: Model, values: Mapping[str, Array], half: Float[Given, ""], thickness: Float[Given, ""]) -> Layers:
     """The squeezed layers, elastic."""
     energy, bulk = under("energy", values), under("volumetric", values)
 
@@ -62,7 +63,7 @@ def layer(model: Model, values: Mapping[str, Array], half: float, thickness) -> 
     return Layers(2 * half * value, -slope, (2 * half * own, -steep))
 
 
-def relaxed(layers: Layers, relaxing, path: Path, since: Float[Array, "n s"] | None = None) -> tuple[Array, Array]:
+def relaxed(layers: Layers, relaxing, path: Path, since: Float[Given, "n s"] | None = None) -> tuple[Array, Array]:
     """Energy paid for a layer and mean pressure on the flats at every time of a path, relaxed; `since`: its `ages`."""
     g, tau = (jnp.asarray(x)[:, None] for x in relaxing)
     bevel = 0.5 * path.thickness / jnp.tan(0.5 * path.angle)

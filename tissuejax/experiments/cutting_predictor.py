@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from tissuejax.arrays import Given, traced
 from tissuejax.errors import InputError, UnstableSimulation, unknown
 from tissuejax.experiments.cutting import balance_force
 from tissuejax.experiments.cutting_blocks import Blocks
@@ -74,7 +75,9 @@ class CuttingPredictor(Predictor):
         if model.cohesion is None or model.volumetric is None:
             raise InputError("a cut needs a cohesive law and a volumetric energy in its model (bilinear, quadratic)")
         sample, model = drawn(sample), model.across(names)
-        paths = {n: path_of(sample.recordings[n], sample.geometry) for n in names}
+        geometry = sample.geometry
+        assert geometry is not None  # `drawn` refuses a sample without
+        paths = {n: path_of(sample.recordings[n], geometry) for n in names}
         settings, slices = settings or CuttingSettings(), {}
         made = cls(model, sample, names, by, settings, paths, slices, lenient, dict(blocks or {}))
         return made.prepared(start) if by == "simulation" else made
@@ -114,7 +117,7 @@ class CuttingPredictor(Predictor):
             ran = run_slice(model, values, self.slices[name] if ready is None else ready, path)
             force = ran.force
         seen = self.sample.recordings[name].channels[FORCE]
-        channels = {FORCE: Channel(jnp.asarray(path.time), force, "N")}
+        channels: Mapping[str, Channel] = {FORCE: Channel(jnp.asarray(path.time), force, "N")}
         for effect in reversed(model.ordered):
             channels = effect.channels(under(f"effects.{effect.name}", values), None, channels)
         made = channels[FORCE]
@@ -176,13 +179,11 @@ class CuttingPredictor(Predictor):
     def _reported(self, name: str, force) -> Recording:
         r = self.sample.recordings[name]
         seen = r.channels[FORCE]
-        made = Channel(
-            seen.time, force if isinstance(force, jax.core.Tracer) else np.asarray(force), "N", seen.noise_std
-        )
+        made = Channel(seen.time, force if traced(force) else np.asarray(force), "N", seen.noise_std)
         return Recording(name, r.experiment, r.inputs, {FORCE: made}, r.attributes)
 
     def _refuse_failed(self, name: str, ran: Ran | None) -> None:
-        if self.lenient or ran is None or isinstance(ran.failed, jax.core.Tracer) or int(ran.failed) < 0:
+        if self.lenient or ran is None or traced(ran.failed) or int(ran.failed) < 0:
             return
         scene = self.slices[name].scene
         x, y, _ = 1e3 * np.asarray(scene.body.points)[np.asarray(scene.body.cells)[int(ran.element)]].mean(0)
@@ -212,19 +213,19 @@ def _program(predictor: CuttingPredictor, name: str, kind: str, make):
     return _programs[key][0]
 
 
-def _vector(model: Model, at: Mapping[str, Array]):
+def _vector(model: Model, at: Mapping[str, Given]):
     return jnp.stack([jnp.asarray(at[path], float) for path in model.declared])
 
 
-def _compiled(predictor: CuttingPredictor, name: str, at: Mapping[str, Array]):
+def _compiled(predictor: CuttingPredictor, name: str, at: Mapping[str, Given]):
     model = predictor.model.across(())
-    if not any(isinstance(v, jax.core.Tracer) for v in at.values()):  # what is off costs nothing and changes no bit
+    if not traced(*at.values()):  # what is off costs nothing and changes no bit
         model = model.active(at)
     program = _program(predictor, name, f"run {model}", lambda v, ready: predictor.force(name, v, model, ready))
     return program(_vector(model, at), predictor.slices.get(name))
 
 
-def _linearised(predictor: CuttingPredictor, name: str, at: Mapping[str, Array], basis, model: Model):
+def _linearised(predictor: CuttingPredictor, name: str, at: Mapping[str, Given], basis, model: Model):
     def both(v, basis, ready):
         def along(direction):
             force, slope, ran = jax.jvp(

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from tissuejax.arrays import Given
 from tissuejax.errors import InputError
 from tissuejax.recordings.recording import Channel, Geometry, Recording, Sample
 
@@ -26,17 +27,17 @@ class Path(NamedTuple):
         notch: how far the cut reached before the start, m.
     """
 
-    time: Float[np.ndarray, " n"]
-    x: Float[np.ndarray, " n"]
-    speed: Float[np.ndarray, " n"]
-    front: Float[np.ndarray, " n"]
-    fresh: Float[np.ndarray, " n"]
-    depth: Float[np.ndarray, " n"]
-    length: float
-    thickness: float
-    angle: float
-    half: float
-    notch: float
+    time: Float[Given, " n"]
+    x: Float[Given, " n"]
+    speed: Float[Given, " n"]
+    front: Float[Given, " n"]
+    fresh: Float[Given, " n"]
+    depth: Float[Given, " n"]
+    length: Float[Given, ""]
+    thickness: Float[Given, ""]
+    angle: Float[Given, ""]
+    half: Float[Given, ""]
+    notch: Float[Given, ""]
 
 
 def path_of(recording: Recording, geometry: Geometry) -> Path:

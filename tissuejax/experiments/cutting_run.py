@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from tissuejax.cohesion.law import Law
+from tissuejax.arrays import Given
 from tissuejax.effects.effect import Effect
 from tissuejax.errors import InputError
 from tissuejax.experiments.cutting import met
@@ -23,7 +23,7 @@ from tissuejax.experiments.cutting_record import Path
 from tissuejax.experiments.probing import Added
 from tissuejax.mesh.slab import plane_slice, slice_held
 from tissuejax.model import Model
-from tissuejax.parameters import under
+from tissuejax.parameters import Constants, under
 from tissuejax.tled import build, seam
 from tissuejax.tled.blade import Wedge
 from tissuejax.tled.scene import Scene
@@ -65,13 +65,13 @@ class Slice(NamedTuple):
     the run's time over the record's while the blade moves (relaxation times shrink by it)."""
 
     scene: Scene
-    at: Float[np.ndarray, " P"]
-    pace: Float[np.ndarray, " P"]
-    elapsed: Float[np.ndarray, " P"]
+    at: Float[Given, " P"]
+    pace: Float[Given, " P"]
+    elapsed: Float[Given, " P"]
     width: float
-    pathtime: Float[np.ndarray, " n"]
-    runtime: Float[np.ndarray, " n"]
-    heading: Float[np.ndarray, " m"]
+    pathtime: Float[Given, " n"]
+    runtime: Float[Given, " n"]
+    heading: Float[Given, " m"]
     faster: float
 
 
@@ -87,25 +87,26 @@ class Ran(eqx.Module):
 
 def element_size(settings: CuttingSettings, path: Path) -> float:
     """Size of the elements along the path, m."""
-    return settings.h or min(0.5 * path.thickness, path.length / FEW)
+    return settings.h or float(min(0.5 * path.thickness, path.length / FEW))
 
 
-def prepare(model: Model, values: Mapping[str, float], density: float, path: Path, settings: CuttingSettings) -> Slice:
+def prepare(model: Model, values: Constants, density: float, path: Path, settings: CuttingSettings) -> Slice:
     """The slice that `run_slice` simulates.
 
     Raises:
-        InputError: no cohesive law in the model; see `tled.seam` for blade and faces.
+        InputError: no cohesive law or volumetric energy in the model; see `tled.seam` for blade and faces.
     """
-    law: Law | None = model.cohesion
-    if law is None:
-        raise InputError("the model has no cohesive law: name one, e.g. --law bilinear")
+    law, volumetric = model.cohesion, model.volumetric
+    if law is None or volumetric is None:
+        raise InputError("a cut needs a cohesive law and a volumetric energy in its model, e.g. bilinear and quadratic")
     h = element_size(settings, path)
     far = float(min(path.x.max(), settings.reach or np.inf))
     used = path.x <= far + 1e-12
     last = len(used) if used.all() else int(np.argmin(used))
     x = path.x[:last]
-    length = min(path.length, far + 4 * path.thickness)
-    made = plane_slice(round(length / h) * h, path.half, h, settings.growth)
+    half, thickness = float(path.half), float(path.thickness)
+    length = min(float(path.length), far + 4 * thickness)
+    made = plane_slice(round(length / h) * h, half, h, settings.growth)
     # the run's clock: same places in the same order, at SPEED; rests pass in no time
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(x)))])
     keep = np.concatenate([[True], np.diff(way) > 1e-9])
@@ -115,13 +116,13 @@ def prepare(model: Model, values: Mapping[str, float], density: float, path: Pat
     damping = settings.damping
     if damping is None:
         shear = float(model.energy.initial_shear_modulus(under("energy", values)))
-        damping = CALM_CUT * 0.5 * np.pi * np.sqrt(shear / density) / path.half
+        damping = CALM_CUT * 0.5 * np.pi * np.sqrt(shear / density) / half
     scene = build.scene(
         made.geometry,
-        build.Tissue(model.energy, model.volumetric, under("energy", values), under("volumetric", values), density),
+        build.Tissue(model.energy, volumetric, under("energy", values), under("volumetric", values), density),
         times,
         numerics=build.Numerics(mass_damping=damping, hourglass=seam.HOURGLASS),
-        held=slice_held(np.asarray(made.geometry.points), path.half),
+        held=slice_held(np.asarray(made.geometry.points), half),
         joined=seam.pairs(made),
     )
     middle = np.asarray(made.geometry.points)[made.minus].mean(1)[:, 0]
@@ -130,7 +131,7 @@ def prepare(model: Model, values: Mapping[str, float], density: float, path: Pat
     faces = len(middle)
     scene = seam.joined(scene, made, law, strong, notch=(middle < path.notch).astype(float))
     slope = float(np.tan(path.angle / 2))
-    blade = Wedge(path.thickness, slope, settings.rounding or seam.shoulder(path.thickness, slope, h))
+    blade = Wedge(thickness, slope, settings.rounding or seam.shoulder(thickness, slope, h))
     tip = np.stack([x[keep], np.zeros(keep.sum()), np.zeros(keep.sum())], 1)
     scene = seam.armed(scene, made, blade, runtime[keep], tip, friction=0.0)
     spread = {k: jnp.full(faces, float(v)) for k, v in cohesive.items()}
@@ -147,10 +148,11 @@ def prepare(model: Model, values: Mapping[str, float], density: float, path: Pat
 
 def run_slice(model: Model, values: Mapping[str, Array], ready: Slice, path: Path) -> Ran:
     """Force against the motion at the path's times, N. Pure JAX."""
-    scene = ready.scene
+    scene, faces = ready.scene, ready.scene.faces
+    assert faces is not None  # on the path of the cut, and with them the run keeps its balance
     depth = jnp.interp(jnp.asarray(ready.at), jnp.asarray(path.front), jnp.asarray(path.depth))
     cut = met(model, values, path, ready.at, ready.pace, ready.elapsed, depth)
-    fields = {**scene.faces.values, "energy": cut.energy, "strength": cut.strength}
+    fields = {**faces.values, "energy": cut.energy, "strength": cut.strength}
     changes = {
         "tissue.energy_values": {k: jnp.asarray(v, float) for k, v in under("energy", values).items()},
         "tissue.volumetric_values": {k: jnp.asarray(v, float) for k, v in under("volumetric", values).items()},
@@ -170,13 +172,15 @@ def run_slice(model: Model, values: Mapping[str, Array], ready: Slice, path: Pat
     if scene.tissue.prony is not None:
         scene = scene.put({"tissue.prony.tau": scene.tissue.prony.tau * ready.faster})
     out = simulate(scene)
+    balance = out.balance
+    assert balance is not None
     # what mass damping took is none of a slow cut's: there is nothing to shake there
-    shaken = jnp.diff(out.balance.damping, prepend=0.0) / (SPEED * scene.clock.interval)
+    shaken = jnp.diff(balance.damping, prepend=0.0) / (SPEED * scene.clock.interval)
     force = (-out.force[:, 0] - jnp.asarray(ready.heading) * shaken) / ready.width
     at = jnp.interp(jnp.asarray(ready.runtime), out.time, force)
     deep = met(model, values, path, path.front, path.speed, path.time - path.time[0], path.depth).depth
-    work = jnp.abs(out.balance.work)
+    work = jnp.abs(balance.work)
     late = work > 0.05 * work[-1]
     poison = jnp.where(out.failed >= 0, jnp.nan, 0.0)
-    worst = jnp.max(jnp.where(late, jnp.abs(out.balance.error), 0.0))
-    return Ran(at * deep + poison, out.failed, out.element, worst, out.balance.area[-1] / ready.width)
+    worst = jnp.max(jnp.where(late, jnp.abs(balance.error), 0.0))
+    return Ran(at * deep + poison, out.failed, out.element, worst, balance.area[-1] / ready.width)

@@ -50,23 +50,25 @@ def lateral(
     p = under("volumetric", values)
     uniaxial = 2 * test.swell if test.mode == "extension" else jnp.zeros_like(test.swell)
 
-    def third_face(ln_J: Array, skew: Array, drive: Array) -> Array:
-        F = deformation(test, drive, ln_J, skew)
-        J = jnp.exp(ln_J)
-        slope = jax.grad(lambda j: jnp.sum(model.volumetric.energy(p, j)))(J)
-        tau = hydrostatic(isochoric(right_cauchy_green(F)).S, F)
-        return (J * slope - tau) / model.volumetric.bulk_modulus(p)
-
     def second_face(ln_J: Array, skew: Array, drive: Array) -> Array:
         across = unlike(test, drive, ln_J, skew, isochoric) / shear_modulus
         return uniaxial * across + (1 - uniaxial) * skew
 
-    if model.isotropic:
-        return _each(lambda y: third_face(y, zero, drive), zero), zero
-    if model.volumetric is None:
+    volumetric = model.volumetric
+    if volumetric is None:
         if test.mode != "extension":  # both in-plane stretches are driven
             return zero, zero
         return zero, _exact_zero(_along(lambda y, seen: second_face(jnp.zeros_like(seen), y, seen), drive))
+
+    def third_face(ln_J: Array, skew: Array, drive: Array) -> Array:
+        F = deformation(test, drive, ln_J, skew)
+        J = jnp.exp(ln_J)
+        slope = jax.grad(lambda j: jnp.sum(volumetric.energy(p, j)))(J)
+        tau = hydrostatic(isochoric(right_cauchy_green(F)).S, F)
+        return (J * slope - tau) / volumetric.bulk_modulus(p)
+
+    if model.isotropic:
+        return _each(lambda y: third_face(y, zero, drive), zero), zero
 
     def both(y: Array, one: Array) -> Array:
         return jnp.stack([third_face(y[0], y[1], one), second_face(y[0], y[1], one)])

@@ -10,7 +10,7 @@ history, the pressure follows from the free third face (P33 = 0), and the nomina
 sensor. All functions are pure; time is the trailing axis of every tensor component.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import ClassVar
 
@@ -19,19 +19,21 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from tissuejax.arrays import Given
 from tissuejax.effects.effect import Effect
 from tissuejax.effects.material_test import MaterialTest, Stress
 from tissuejax.energies.strain import Strain
 from tissuejax.errors import InputError, unknown
+from tissuejax.experiments.catalogue import experiment
 from tissuejax.experiments.experiment import Experiment
 from tissuejax.experiments.free_faces import lateral, unlike
 from tissuejax.experiments.kinematics import Gradient, deformation, hydrostatic, in_sample, nominal, right_cauchy_green
 from tissuejax.model import Model
-from tissuejax.parameters import Parameter, under
+from tissuejax.parameters import Constants, Parameter, under
 from tissuejax.recordings.recording import Channel, Recording
 from tissuejax.tensors import Sym, determinant
 
-Values = Mapping[str, Array]
+Values = Constants  # by dotted path
 
 
 class Homogeneous(Experiment):
@@ -92,7 +94,21 @@ class Homogeneous(Experiment):
         return reported(recording, _compiled(model.across(()), known, self.test(recording)))
 
 
-def axes(direction: object | None, normal: object | None = None) -> np.ndarray:
+def material_test_kind(name: str) -> Homogeneous:
+    """The kind of material test called `name`.
+
+    Raises:
+        InputError: no such kind of experiment, or one that needs a body.
+    """
+    found = experiment(name)
+    if not isinstance(found, Homogeneous):
+        raise InputError(f"{name} is no material test; a probing needs the body it is made on")
+    return found
+
+
+def axes(
+    direction: Sequence[float] | np.ndarray | None, normal: Sequence[float] | np.ndarray | None = None
+) -> np.ndarray:
     """Rows: loaded, second and free axis of a test in the sample's frame.
 
     The second axis is the one given as `normal`: of the sheared planes, or of the second loaded direction. Without it
@@ -123,14 +139,14 @@ def axes(direction: object | None, normal: object | None = None) -> np.ndarray:
     return np.stack([first, np.cross(third, first), third])
 
 
-def local(model: Model, values: Values, recording: str) -> dict[str, Array]:
+def local(model: Model, values: Values, recording: str) -> dict[str, Given]:
     """Every declared parameter's value in one recording: its own, the common one, or the default.
 
     Raises:
         InputError: a path that the model doesn't know.
     """
     declared = _declared(model)
-    found = {}
+    found: dict[str, Given] = {}
     for path, parameter in declared.items():
         own = f"{path}.{recording}"
         source = own if parameter.each and own in values else path
@@ -146,7 +162,7 @@ def _declared(model: Model) -> dict[str, Parameter]:
     return model.declared
 
 
-def reported(recording: Recording, stress: Float[Array, "n ..."]) -> Recording:
+def reported(recording: Recording, stress: Float[Given, "n ..."]) -> Recording:
     """`recording` with predicted nominal stress in place of the measured one."""
     channel = Channel(recording.inputs["time"], stress, "Pa")
     return Recording(
@@ -237,7 +253,7 @@ def elastic(model: Model, values: Values, test: MaterialTest, C: Sym) -> Stress:
 
 
 def _swollen(
-    effects: list[tuple[Effect, Values]],
+    effects: Sequence[tuple[Effect, Values]],
     test: MaterialTest,
     before: tuple[Float[Array, " n"], Float[Array, " n"]],
     at: Callable[..., tuple[Gradient, Sym]],
@@ -252,7 +268,7 @@ def _swollen(
     `before` where nothing swells.
     """
     ln_J, skew = before
-    still = None if across is None else across(ln_J, skew)
+    still = 0.0 if across is None else across(ln_J, skew)
 
     def added(guess: Array, skew: Array, *elastic: list) -> Array:
         F, S = at(guess, skew, *elastic)
@@ -260,15 +276,15 @@ def _swollen(
         return ln_J + sum(effect.volume(p, test, mean, guess) for effect, p in effects)
 
     def newton(state: tuple[Array, Array], _: None) -> tuple[tuple[Array, Array], None]:
-        guess, skew = state
+        (guess, skew), pull = state, across
         target, slope = jax.jvp(lambda x: added(x, skew, []), (guess,), (jnp.ones_like(guess),))
         target = added(guess, skew) if lasting else target
         step = (guess - target) / (1 - jnp.minimum(slope, 0.5))
         guess = jnp.clip(guess - step, -1.5, 1.5)
-        if across is not None:
-            pull, slope = jax.jvp(lambda x: across(guess, x), (skew,), (jnp.ones_like(skew),))
+        if pull is not None:
+            pulled, slope = jax.jvp(lambda x: pull(guess, x), (skew,), (jnp.ones_like(skew),))
             free = slope > 0  # never elsewhere than in tests whose second face is free
-            skew = skew - jnp.where(free, jnp.clip((pull - still) / jnp.where(free, slope, 1.0), -0.2, 0.2), 0.0)
+            skew = skew - jnp.where(free, jnp.clip((pulled - still) / jnp.where(free, slope, 1.0), -0.2, 0.2), 0.0)
         return (guess, skew), None
 
     return jax.lax.scan(newton, (ln_J, skew), None, length=8)[0]

@@ -15,10 +15,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from tissuejax.arrays import Given, traced
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.errors import InputError, unknown
-from tissuejax.experiments.catalogue import experiment
-from tissuejax.experiments.homogeneous import local, nominal_stress, reported
+from tissuejax.experiments.homogeneous import local, material_test_kind, nominal_stress, reported
 from tissuejax.experiments.predictor import Predictor, Tangents
 from tissuejax.model import Model
 from tissuejax.parameters import Values
@@ -50,7 +50,7 @@ class HomogeneousPredictor(Predictor):
         tests = {}
         for name in names:
             recording = sample.recordings[name]
-            tests[name] = padded(experiment(recording.experiment).test(recording))
+            tests[name] = padded(material_test_kind(recording.experiment).test(recording))
         return cls(model.across(names), sample, names, tests)
 
     def of(self, names: Sequence[str]) -> "HomogeneousPredictor":
@@ -79,15 +79,15 @@ class HomogeneousPredictor(Predictor):
                 basis[:, j] = [path in source for path in paths]
             stress, slopes = _linearised(model, _vector(known), test, basis)
             recordings[name] = self._reported(name, stress)
-            slopes = slopes if _traced(slopes) else np.asarray(slopes)
+            slopes = slopes if traced(slopes) else np.asarray(slopes)
             for i, path in enumerate(paths):
                 tangents[path][name] = {"nominal_stress": self._cut(name, slopes[i])}
         return recordings, tangents
 
-    def _within(self, values: Values, name: str, wanted: Sequence[str] = ()) -> tuple[Model, dict[str, Array]]:
+    def _within(self, values: Values, name: str, wanted: Sequence[str] = ()) -> tuple[Model, dict[str, Given]]:
         """The model without effects that are off in recording `name`, and the value of each of its parameters."""
         known = local(self.model, values, name)
-        if any(map(_traced, known.values())):
+        if traced(*known.values()):
             return self.model.across(()), known
         off = tuple(path for path, value in known.items() if value == 0)
         key = off, tuple(wanted)
@@ -97,12 +97,12 @@ class HomogeneousPredictor(Predictor):
         model, paths = self.reduced[key]
         return model, {path: known[path] for path in paths}
 
-    def _cut(self, name: str, padded_series: Array) -> Array:
+    def _cut(self, name: str, padded_series: Given) -> Given:
         """Without padding; on the host where possible, as a slice on the device is compiled for each length."""
         n = len(self.sample.recordings[name].inputs["time"])
-        return padded_series[:n] if _traced(padded_series) else np.asarray(padded_series)[:n]
+        return padded_series[:n] if traced(padded_series) else np.asarray(padded_series)[:n]
 
-    def _reported(self, name: str, stress: Array) -> Recording:
+    def _reported(self, name: str, stress: Given) -> Recording:
         return reported(self.sample.recordings[name], self._cut(name, stress))
 
 
@@ -110,7 +110,7 @@ def padded(test: MaterialTest) -> MaterialTest:
     """`test` with its series lengthened to a multiple of 256 by repeating the last sample."""
     extra = -len(test.time) % BLOCK
 
-    def longer(series: np.ndarray) -> np.ndarray:
+    def longer(series: Given) -> np.ndarray:
         return np.concatenate([series, np.repeat(series[-1:], extra, axis=0)])
 
     arrays = {name: getattr(test, name) for name in test.__dataclass_fields__}
@@ -132,11 +132,7 @@ def _linearised(
     )
 
 
-def _vector(known: dict[str, Array]) -> Float[Array, " p"]:
+def _vector(known: Mapping[str, Given]) -> Float[Given, " p"]:
     """One array for all values: on the host unless one of them is traced."""
     values = list(known.values())
-    return jnp.stack([jnp.asarray(v) for v in values]) if any(map(_traced, values)) else np.array(values, float)
-
-
-def _traced(value: Array) -> bool:
-    return isinstance(value, jax.core.Tracer)
+    return jnp.stack([jnp.asarray(v) for v in values]) if traced(*values) else np.array(values, float)

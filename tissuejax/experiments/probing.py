@@ -51,7 +51,7 @@ class Added(eqx.Module):
     effect: Effect = eqx.field(static=True)
     values: Mapping[str, Array]
 
-    def __call__(self, strain: Strain) -> Float[Array, "..."]:
+    def __call__(self, strain: Strain) -> Float[Array, "..."] | float:
         return self.effect.energy(self.values, strain)
 
 
@@ -106,7 +106,7 @@ def assembled(model: Model, values: Mapping[str, Array], setup: Setup) -> tuple[
     scene = scene.cast(dtype)
     ballast = _ballast(scene)
     share = jnp.sum(ballast) / jnp.sum(setup.test.mass) / scene.body.cells.shape[1]
-    return scene.put({"probe.mass": scene.probe.mass + ballast}), share
+    return scene.put({"probe.mass": scene.pressed.mass + ballast}), share
 
 
 def _ballast(scene: Scene) -> Float[Array, " N"]:
@@ -126,16 +126,17 @@ def _ballast(scene: Scene) -> Float[Array, " N"]:
     factor = (2 / critical / allowed) ** 2
     count, nodes = frozen.body.cells.shape
     extra = frozen.tissue.density * mesh.reference.volume[:count] / nodes * jnp.maximum(factor - 1.0, 0.0)
-    return jnp.zeros_like(frozen.probe.mass).at[frozen.body.cells].add(extra[:, None])
+    return jnp.zeros_like(frozen.pressed.mass).at[frozen.body.cells].add(extra[:, None])
 
 
 def simulated(model: Model, values: Mapping[str, Array], setup: Setup) -> Simulated:
     """Force and markers that the sensors would report. Pure JAX: jit, jvp, vjp and vmap work from outside."""
     scene, ballast = assembled(model, values, setup)
     out = simulate(scene)
-    channels = {"force": Channel(out.time, out.force, "N")}
-    if out.markers is not None and len(setup.marker_times):
-        channels["markers"] = Channel(out.end_time, _about_rest(out.markers, setup), "m")
+    channels: Mapping[str, Channel] = {"force": Channel(out.time, out.force, "N")}
+    placed = setup.scene.markers
+    if out.markers is not None and placed is not None and len(setup.marker_times):
+        channels = {**channels, "markers": Channel(out.end_time, _about_rest(out.markers, placed.rest, setup), "m")}
     for effect in reversed(model.ordered):
         channels = effect.channels(under(f"effects.{effect.name}", values), setup.test, channels)
     times = {"force": setup.force_times, "markers": setup.marker_times}
@@ -148,9 +149,9 @@ def simulated(model: Model, values: Mapping[str, Array], setup: Setup) -> Simula
     )
 
 
-def _about_rest(markers: Float[Array, "n k 3"], setup: Setup) -> Float[Array, "n k 3"]:
+def _about_rest(markers: Float[Array, "n k 3"], rest: Float[Array, "k 3"], setup: Setup) -> Float[Array, "n k 3"]:
     """Markers such that their mean over the frames out of contact is the measured one, also on a moving support."""
-    moved = markers - setup.scene.markers.rest
+    moved = markers - rest
     calm = jnp.tensordot(setup.calm.astype(moved.dtype), moved, 1)
     return markers - jnp.where(jnp.sum(setup.calm) > 0, calm, 0.0)
 

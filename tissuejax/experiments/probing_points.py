@@ -34,7 +34,7 @@ def write_points(predicted: Recording, t: float, target: Path, measured: Recordi
     shown, real = markers_at(predicted, t), markers_at(measured, t)
     shown = np.zeros((0, 3)) if shown is None else shown
     gap = np.full_like(shown, np.nan) if real is None else real - shown
-    seen = np.isfinite(gap).all(1)
+    seen = np.all(np.isfinite(gap), axis=1)
     places = np.concatenate([tip_at(predicted, t)[None], np.nan_to_num(shown)])
     data = {
         "kind": np.array([PROBE] + [MARKER] * len(shown)),

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from tissuejax.arrays import Given, traced
 from tissuejax.cache.programs import keep_programs
 from tissuejax.errors import UnstableSimulation, unknown
 from tissuejax.experiments import programs, workers
@@ -101,7 +102,7 @@ class ProbingPredictor(Predictor):
             self._refuse_failed(name, run)
             recordings[name] = self._reported(name, run)
             for row, i in enumerate(part):
-                tangents[paths[i]][name] = {c: self.unpadded(name, c, slope[row]) for c, slope in slopes.items()}
+                tangents[paths[int(i)]][name] = {c: self.unpadded(name, c, slope[row]) for c, slope in slopes.items()}
         for name in self.names:
             if name not in recordings:  # no path acts in this recording
                 recordings |= self.of([name]).predict(values)
@@ -126,19 +127,19 @@ class ProbingPredictor(Predictor):
 
     def _side_by_side(self, jobs: list) -> list:
         """Run the jobs on as many processes as the settings say; in order and here where values are traced."""
-        if any(isinstance(theta, jax.core.Tracer) for _, _, theta, *_ in jobs):
+        if traced(*(theta for _, _, theta, *_ in jobs)):
             return [programs.run(*job) for job in jobs]
         return workers.run_all(jobs, self.settings.processes)
 
     def _refuse_failed(self, name: str, run: Simulated) -> None:
-        if isinstance(run.failed, jax.core.Tracer):
+        if traced(run.failed):
             return
         finite = all(np.isfinite(v[..., 0]).any() for v in run.channels.values())
         if int(run.failed) < 0 and int(run.pierced) < 0 and finite:
             return
         setup = self.setups[name]
         if int(run.failed) < 0 and int(run.pierced) >= 0:
-            probe, when = setup.scene.probe, float(setup.scene.clock.ends[int(run.pierced)])
+            probe, when = setup.scene.pressed, float(setup.scene.clock.ends[int(run.pierced)])
             at = [1e3 * np.interp(when, np.asarray(probe.time), axis) for axis in np.asarray(probe.position).T]
             raise UnstableSimulation(
                 f"recording {name}: by t = {when:.3g} s the surface had sunk into the probe by more than {PIERCED:.0%} "
@@ -163,8 +164,8 @@ class ProbingPredictor(Predictor):
             for c, v in run.channels.items()
         }
         checks = {}
-        if not isinstance(run.depth, jax.core.Tracer):
-            deep = max(0.0, float(run.depth)) / float(self.setups[name].scene.probe.shape.radius)
+        if not traced(run.depth):
+            deep = max(0.0, float(run.depth)) / float(self.setups[name].scene.pressed.shape.reach())
             checks = {
                 "numerics/hourglass": float(run.hourglass),
                 "numerics/penetration": deep,
@@ -242,8 +243,8 @@ def _linearised(
     return out, slopes
 
 
-def _vector(values: Mapping[str, Array]) -> Float[Array, " p"]:
+def _vector(values: Mapping[str, Given]) -> Float[Given, " p"]:
     """One array for all values: on the host unless one of them is traced."""
-    if any(isinstance(v, jax.core.Tracer) for v in values.values()):
+    if traced(*values.values()):
         return jnp.stack([jnp.asarray(v) for v in values.values()])
     return np.array([float(v) for v in values.values()])

@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 from scipy.ndimage import gaussian_filter1d
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
+from tissuejax.arrays import Given
 from tissuejax.errors import InputError
 from tissuejax.mesh.facets import Facets, triangles
 from tissuejax.recordings.recording import Recording
@@ -42,8 +43,8 @@ def surface_gap(
     bary = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4
     dots = np.einsum("qc,fcd->fqd", bary, corners).reshape(-1, 3)
     if isinstance(tip, Sphere):
-        return cKDTree(dots).query(path)[0] - float(tip.radius)
-    away = cKDTree(path).query(dots)[0]
+        return KDTree(dots).query(path)[0] - float(tip.radius)
+    away = KDTree(path).query(dots)[0]
     dots = dots[away < max(3 * float(tip.reach()), float(away.min()) + float(tip.reach()))]
 
     def least(at):
@@ -122,7 +123,7 @@ def rest_positions(
 
 
 def read_at(
-    times: Float[Array, " m"], clock: Float[Array, " n"], series: Float[Array, "n ..."]
+    times: Float[Given, " m"], clock: Float[Given, " n"], series: Float[Given, "n ..."]
 ) -> Float[Array, "m ..."]:
     """`series` given at `clock`, by linear interpolation at `times`, held at the ends."""
     flat = series.reshape(len(clock), -1)

@@ -9,8 +9,9 @@ from collections.abc import Sequence
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Float, Int
 
+from tissuejax.arrays import Given
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.energies.volumetric import Quadratic
 from tissuejax.errors import InputError
@@ -53,10 +54,10 @@ class Setup(eqx.Module):
 
     scene: Scene
     test: ProbingTest
-    force_times: Float[Array, " n"]
-    marker_times: Float[Array, " m"]
-    calm: Float[Array, " frames"]
-    damping: Float[Array, ""]
+    force_times: Float[Given, " n"]
+    marker_times: Float[Given, " m"]
+    calm: Float[Given, " frames"]
+    damping: Float[Given, ""]
 
 
 def setups(model: Model, sample: Sample, names: Sequence[str], settings: ProbingSettings) -> dict[str, Setup]:

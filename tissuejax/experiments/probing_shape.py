@@ -37,7 +37,8 @@ class Deformed(NamedTuple):
 def deformed(predictor: ProbingPredictor, values: Mapping[str, float], name: str) -> Deformed:
     """Simulate recording `name` down to its deepest point; the program is the one that predicts."""
     setup = predictor.setups[name]
-    time, path = np.asarray(setup.scene.probe.time), np.asarray(setup.scene.probe.position)
+    probe = setup.scene.pressed
+    time, path = np.asarray(probe.time), np.asarray(probe.position)
     bottom = int(path[:, 2].argmin())
     held = np.where((np.arange(len(time)) <= bottom)[:, None], path, path[bottom])
     stopped = eqx.tree_at(lambda s: s.scene.probe.position, setup, held)
@@ -57,5 +58,5 @@ def deformed(predictor: ProbingPredictor, values: Mapping[str, float], name: str
     return Deformed(
         name, when, np.asarray(body.points, float) + np.asarray(out.displacement, float),
         boundary(np.asarray(body.cells), body.element.cells).nodes, path[bottom].astype(float),
-        float(setup.scene.probe.shape.radius), rest, measured, simulated,
+        float(probe.shape.reach()), rest, measured, simulated,
     )  # fmt: skip

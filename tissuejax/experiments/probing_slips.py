@@ -30,7 +30,8 @@ def probing_slips(sample: Sample, names: Iterable[str] | None = None) -> list[st
     probed = [n for n in chosen if sample.recordings[n].experiment == "probing"]
     if not probed or sample.geometry is None:
         return []
-    said, points = _body(sample), np.asarray(sample.geometry.points, float)
+    points = np.asarray(sample.geometry.points, float)
+    said = _body(points)
     try:
         top = facing_up(points, boundary(sample.geometry.cells, sample.geometry.cell_type))
     except InputError:
@@ -51,8 +52,8 @@ def warned(slips_said: Iterable[str]) -> list[str]:
     return [f"Look at the data: {said}" + ("" if said.endswith("?") else ".") for said in slips_said]
 
 
-def _body(sample: Sample) -> list[str]:
-    size = float(np.ptp(sample.geometry.points, axis=0).max())
+def _body(points: Float[np.ndarray, "N 3"]) -> list[str]:
+    size = float(np.ptp(points, axis=0).max())
     if size > LARGEST:
         return [f"the body is {size:.4g} m large: mm read as m?"]
     return []

@@ -12,6 +12,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from tissuejax.arrays import traced
 from tissuejax.tled.simulate import COMPILER_OPTIONS
 
 _lock, _running = threading.Lock(), threading.Lock()
@@ -25,7 +26,7 @@ def run(function: Callable, static: Any, *arguments: Any) -> Any:
         function: pure JAX; `static` is its hashable first argument.
         arguments: pytrees of arrays; programs are shared by arguments of equal structure, shapes and precision.
     """
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(arguments)):
+    if traced(*jax.tree.leaves(arguments)):
         return function(static, *arguments)
     arguments = jax.tree.map(jnp.asarray, arguments)
     program = _program(function, static, *arguments)

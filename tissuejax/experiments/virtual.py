@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.errors import InputError
-from tissuejax.experiments.catalogue import experiment
+from tissuejax.experiments.homogeneous import material_test_kind
 from tissuejax.recordings.recording import Channel, Recording
 
 MOST = 10**7  # samples: beyond, one recording fills a memory
@@ -43,9 +43,7 @@ def material_test(name: str, kind: str, time: np.ndarray, drive: np.ndarray, **a
     Raises:
         InputError: an unknown kind, or a drive that is none of it.
     """
-    test = experiment(kind)
-    if test.kind != "homogeneous":
-        raise InputError(f"{kind} is no material test; a probing needs the body it is made on")
+    test = material_test_kind(kind)
     empty = {"nominal_stress": Channel(time, np.zeros(np.shape(drive)), "Pa")}
     made = Recording(name, kind, {"time": time, test.driven: drive}, empty, attributes)
     test.test(made)

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 
 from tissuejax.cache import source
 from tissuejax.experiments import programs
@@ -38,7 +39,7 @@ class Worker:
         flags = os.environ.get("XLA_FLAGS", "")
         if "xla_cpu_multi_thread_eigen" not in flags:
             flags = f"{flags} --xla_cpu_multi_thread_eigen=false".strip()
-        double = "1" if jax.config.jax_enable_x64 else "0"
+        double = "1" if jnp.result_type(float) == jnp.float64 else "0"
         environment = os.environ | {
             "PYTHONPATH": path,
             "XLA_FLAGS": flags,
@@ -46,17 +47,20 @@ class Worker:
             "JAX_PLATFORMS": "cpu",
             CODE: source.LOADED,
         }
-        self.process = subprocess.Popen(
+        process = subprocess.Popen(
             [sys.executable, "-m", "tissuejax.experiments.workers"],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment,
         )  # fmt: skip
+        assert process.stdin is not None  # a pipe, as it was asked for
+        assert process.stdout is not None
+        self.process, self.jobs, self.answers = process, process.stdin, process.stdout
         atexit.register(self.close)
 
     def ask(self, job: Job, do: Callable) -> Any:
         """The result of one job; an exception of the job is raised here."""
-        pickle.dump((do, jax.device_get(job)), self.process.stdin)
-        self.process.stdin.flush()
-        fine, answer = pickle.load(self.process.stdout)
+        pickle.dump((do, jax.device_get(job)), self.jobs)
+        self.jobs.flush()
+        fine, answer = pickle.load(self.answers)
         if not fine:
             raise answer
         return answer
@@ -65,7 +69,7 @@ class Worker:
         """End the process, also in the middle of a job (a compilation can't be interrupted)."""
         if self.process.poll() is None:
             with suppress(BrokenPipeError):
-                self.process.stdin.close()
+                self.jobs.close()
             try:
                 self.process.wait(timeout=PATIENT)
             except subprocess.TimeoutExpired:

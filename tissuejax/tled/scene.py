@@ -19,10 +19,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from tissuejax.arrays import Given
 from tissuejax.elements.element import Element
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.volumetric import Volumetric
 from tissuejax.errors import InputError, unknown
+from tissuejax.parameters import Constants
 from tissuejax.tled.faces import Faces
 from tissuejax.tled.history import Damage, Prony
 from tissuejax.tled.shapes import Shape
@@ -41,13 +43,13 @@ class Body(eqx.Module):
         settled: displacement at time zero (prestress: the settled shape under gravity); None is the stress-free shape.
     """
 
-    points: Float[Array, "N 3"]
-    cells: Int[Array, "E k"]
-    fixed: Int[Array, " F"]
-    held: Float[Array, "F 3"]
-    facets: Int[Array, "S v"]
+    points: Float[Given, "N 3"]
+    cells: Int[Given, "E k"]
+    fixed: Int[Given, " F"]
+    held: Float[Given, "F 3"]
+    facets: Int[Given, "S v"]
     element: Element = eqx.field(static=True)
-    settled: Float[Array, "N 3"] | None = None
+    settled: Float[Given, "N 3"] | None = None
 
 
 class Tissue(eqx.Module):
@@ -67,15 +69,15 @@ class Tissue(eqx.Module):
 
     energy: Energy = eqx.field(static=True)
     volumetric: Volumetric = eqx.field(static=True)
-    energy_values: Mapping[str, Array]
-    volumetric_values: Mapping[str, Array]
-    density: Float[Array, ""]
-    stiffness: Float[Array, " E"] | None = None
+    energy_values: Constants
+    volumetric_values: Constants
+    density: Float[Given, ""]
+    stiffness: Float[Given, " E"] | None = None
     added: tuple[Any, ...] = ()
     prony: Prony | None = None
     drain: Prony | None = None
     damage: Damage | None = None
-    capsule: Float[Array, ""] | None = None
+    capsule: Float[Given, ""] | None = None
 
 
 class Probe(eqx.Module):
@@ -98,20 +100,20 @@ class Probe(eqx.Module):
             neutral 0.
     """
 
-    time: Float[Array, " n"]
-    position: Float[Array, "n 3"]
+    time: Float[Given, " n"]
+    position: Float[Given, "n 3"]
     shape: Shape
-    patch: Int[Array, "P v"]
-    area: Float[Array, "q P"]
-    mass: Float[Array, " N"]
-    penalty: Float[Array, ""]
-    softness: Float[Array, ""]
-    friction: Float[Array, ""] | None = None
-    give: Float[Array, ""] | float = 0.0
-    adhesion: Float[Array, ""] | None = None
-    reach: Float[Array, ""] | float = 2e-4
-    offset: Float[Array, " 3"] | None = None
-    compliance: Float[Array, ""] | None = None
+    patch: Int[Given, "P v"]
+    area: Float[Given, "q P"]
+    mass: Float[Given, " N"]
+    penalty: Float[Given, ""]
+    softness: Float[Given, ""]
+    friction: Float[Given, ""] | None = None
+    give: Float[Given, ""] = 0.0
+    adhesion: Float[Given, ""] | None = None
+    reach: Float[Given, ""] = 2e-4
+    offset: Float[Given, " 3"] | None = None
+    compliance: Float[Given, ""] | None = None
 
 
 class Support(eqx.Module):
@@ -124,19 +126,19 @@ class Support(eqx.Module):
         fluidity: viscous slip: rate of slip per traction, m/(s Pa); neutral 0 (bonded). Neither has a Coulomb limit.
     """
 
-    time: Float[Array, " n"] | None = None
-    displacement: Float[Array, "n 3"] | None = None
-    pattern: Float[Array, "F 3"] | None = None
-    compliance: Float[Array, ""] | None = None
-    fluidity: Float[Array, ""] | None = None
+    time: Float[Given, " n"] | None = None
+    displacement: Float[Given, "n 3"] | None = None
+    pattern: Float[Given, "F 3"] | None = None
+    compliance: Float[Given, ""] | None = None
+    fluidity: Float[Given, ""] | None = None
 
 
 class Markers(eqx.Module):
     """Points of the surface: position = rest + sum_v weights u[nodes]."""
 
-    nodes: Int[Array, "K v"]
-    weights: Float[Array, "K v"]
-    rest: Float[Array, "K 3"]
+    nodes: Int[Given, "K v"]
+    weights: Float[Given, "K v"]
+    rest: Float[Given, "K 3"]
 
 
 class Clock(eqx.Module):
@@ -150,12 +152,12 @@ class Clock(eqx.Module):
     length share one program, and a short one does not pay for a long one.
     """
 
-    start: Float[Array, ""]
-    interval: Float[Array, ""]
-    compression: Float[Array, ""]
+    start: Float[Given, ""]
+    interval: Float[Given, ""]
+    compression: Float[Given, ""]
     frames: int = eqx.field(static=True)
     steps: int = eqx.field(static=True)
-    needed: Int[Array, ""] | None = None
+    needed: Int[Given, ""] | None = None
 
     @property
     def step(self) -> Float[Array, ""]:
@@ -184,9 +186,9 @@ class Settings(eqx.Module):
         memory: bytes that a reverse pass may use for stored states before it recomputes blocks of frames.
     """
 
-    hourglass: Float[Array, ""]
-    mass_damping: Float[Array, ""]
-    stiffness_damping: Float[Array, ""]
+    hourglass: Float[Given, ""]
+    mass_damping: Float[Given, ""]
+    stiffness_damping: Float[Given, ""]
     memory: int = eqx.field(static=True, default=64 * 2**20)
 
 
@@ -204,7 +206,7 @@ class Scene(eqx.Module):
     support: Support
     probe: Probe | None = None
     markers: Markers | None = None
-    gravity: Float[Array, " 3"] | None = None
+    gravity: Float[Given, " 3"] | None = None
     faces: Faces | None = None
     loads: Any = None  # loads.Loads, one floor up
 

@@ -10,7 +10,6 @@ should part them opens nothing.
 """
 
 import math
-from collections.abc import Mapping
 
 import jax.numpy as jnp
 import numpy as np
@@ -20,6 +19,7 @@ from tissuejax.cohesion.law import Law
 from tissuejax.errors import InputError
 from tissuejax.mesh.facets import area_vectors, boundary
 from tissuejax.mesh.split import Split
+from tissuejax.parameters import Constants
 from tissuejax.tled import build
 from tissuejax.tled.blade import Wedge
 from tissuejax.tled.faces import Faces, local, quadrature
@@ -68,7 +68,7 @@ def joined(
     scene: Scene,
     split: Split,
     law: Law,
-    values: Mapping[str, float],
+    values: Constants,
     stiff: float | None = None,
     along: tuple[float, float, float] = (1.0, 0.0, 0.0),
     notch: Float[np.ndarray, " P"] | None = None,

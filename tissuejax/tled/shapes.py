@@ -7,6 +7,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from tissuejax.arrays import Given
+
 Vector = tuple[Float[Array, "..."], Float[Array, "..."], Float[Array, "..."]]
 
 
@@ -40,7 +42,7 @@ class Sphere(Shape):
     """A ball: |x| - R."""
 
     name: ClassVar[str] = "sphere"
-    radius: Float[Array, ""] | float
+    radius: Float[Given, ""]
 
     def distance(self, x: Vector) -> tuple[Array, Vector]:
         r = _length(*x)
@@ -55,7 +57,7 @@ class Hemisphere(Shape):
     """A half ball that points down (-z) under a cylindrical shank of the same radius: distance to an upward capsule."""
 
     name: ClassVar[str] = "hemisphere"
-    radius: Float[Array, ""] | float
+    radius: Float[Given, ""]
 
     def distance(self, x: Vector) -> tuple[Array, Vector]:
         below = jnp.minimum(x[2], 0.0)
@@ -75,8 +77,8 @@ class Punch(Shape):
     """
 
     name: ClassVar[str] = "punch"
-    radius: Float[Array, ""] | float
-    edge: Float[Array, ""] | float
+    radius: Float[Given, ""]
+    edge: Float[Given, ""]
 
     def distance(self, x: Vector) -> tuple[Array, Vector]:
         rho = _length(x[0], x[1])
