@@ -78,7 +78,7 @@ class Element(eqx.Module):
         return 0.0
 
     @abc.abstractmethod
-    def steepness(self, reference: Any, hourglass: float) -> Float[Array, " E"]:
+    def steepness(self, reference: Any, hourglass: Array | float) -> Float[Array, " E"]:
         """Largest eigenvalue of sum_a B_a B_a^T times the number of nodes, 1/m^2, or that of the hourglass modes.
 
         With wave speed c the highest frequency of a mesh of such elements is about c sqrt(steepness): 2 c/L for cubes

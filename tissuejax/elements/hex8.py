@@ -143,7 +143,7 @@ class Hex8(Element):
     def hourglass_energy(self, reference: Reference, memory: Any, stiffness: Float[Array, " E"]) -> Array:
         return 0.5 * jnp.sum(reference.stiffening * stiffness * memory * memory)
 
-    def steepness(self, reference: Reference, hourglass: float) -> Float[Array, " E"]:
+    def steepness(self, reference: Reference, hourglass: Array | float) -> Float[Array, " E"]:
         B = [reference.gradient] if reference.bending is None else [reference.gradient, reference.bending]
         B = jnp.concatenate(B)
         G = 64 * jnp.einsum("kie,kje->ije", B, B)  # nodes * sum_a B_a B_a^T

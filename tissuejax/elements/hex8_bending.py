@@ -104,7 +104,7 @@ class Hex8Bending(Element):
         local = jnp.einsum("aie,iJe,kJe->ake", q, F, reference.axes)
         return 0.5 * jnp.sum(local * self._slopes(reference, local, stiffness))
 
-    def steepness(self, reference: Reference, hourglass: float) -> Float[Array, " E"]:
+    def steepness(self, reference: Reference, hourglass: Array | float) -> Float[Array, " E"]:
         nu, a = self.poisson, reference.length
         short = jnp.sum(1 / (a * a), 0)
         # plane stress with both curvatures: E / (1 - nu) = 2 mu (1 + nu) / (1 - nu); twice the shear of two amplitudes

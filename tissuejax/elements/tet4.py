@@ -47,6 +47,6 @@ class Tet4(Element):
         f = reference.volume * sum(P[:, J][:, None] * B[:, J][None] for J in range(3))  # (i, node, E)
         return tuple(jnp.concatenate([-jnp.sum(row, 0, keepdims=True), row]) for row in f)
 
-    def steepness(self, reference: Reference, hourglass: float) -> Float[Array, " E"]:
+    def steepness(self, reference: Reference, hourglass: Array | float) -> Float[Array, " E"]:
         B = jnp.concatenate([-jnp.sum(reference.gradient, 0, keepdims=True), reference.gradient])
         return largest_eigenvalue(4 * jnp.einsum("aie,aje->ije", B, B))

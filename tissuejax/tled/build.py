@@ -6,7 +6,6 @@ that the probe can come near. What can't work is refused here, once, with a sent
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
@@ -20,6 +19,7 @@ from tissuejax.errors import InputError
 from tissuejax.families import lookup, members
 from tissuejax.mesh.facets import area_vectors, boundary
 from tissuejax.mesh.quality import refuse_bad
+from tissuejax.parameters import Constants
 from tissuejax.recordings.recording import Geometry
 from tissuejax.tled import pressed
 from tissuejax.tled.contact import quadrature
@@ -140,9 +140,9 @@ def scene(
         height = float(np.ptp(np.asarray(geometry.points)[:, 2]))
         speed = math.sqrt(float(tissue.energy.initial_shear_modulus(tissue.energy_values)) / density)
         damping = 0.5 * (math.pi / 2) * speed / height
-    settings = Settings(*(jnp.asarray(float(x)) for x in (hourglass, damping, numerics.stiffness_damping)))
-    began = times[0] - interval / 2
-    clock = Clock(*(jnp.asarray(float(x)) for x in (began, interval, numerics.compression)), len(times), 1)
+    began, numbers = times[0] - interval / 2, (hourglass, damping, numerics.stiffness_damping)
+    settings = Settings(*_scalars(*numbers))
+    clock = Clock(*_scalars(began, interval, numerics.compression), len(times), 1)
     g = None if gravity is None else jnp.asarray(gravity, float)
     bare = Scene(body, tissue, clock, settings, Support(), None, markers, g)
     if probe_path is None:
@@ -157,7 +157,9 @@ def scene(
     return bare.put({"probe": made})
 
 
-def steps(bare: Scene, step: float | None, shape: Shape | None = None, position=None) -> int:
+def steps(
+    bare: Scene, step: float | None, shape: Shape | None = None, position: Float[np.ndarray, "n 3"] | None = None
+) -> int:
     """Steps a frame: the given step, or the greatest that is safe, also where a probe of that `shape` will have pressed
     the tissue on its way through `position` (n, 3).
 
@@ -173,7 +175,7 @@ def steps(bare: Scene, step: float | None, shape: Shape | None = None, position=
         )
     if step is None:
         step = SAFETY * critical
-        if shape is not None:
+        if shape is not None and position is not None:
             points = _now(bare)
             stretch = pressed.spread(bare, pressed.shortest_stretch(points, shape, position))
             under = bounds[pressed.near(points, bare.body.cells, shape, position)].min()
@@ -249,8 +251,12 @@ def _element(geometry: Geometry, name: str | None, tissue: Tissue):
     return made
 
 
-def _floats(values: Mapping[str, float]) -> dict[str, Array]:
+def _floats(values: Constants) -> dict[str, Array]:
     return {name: jnp.asarray(value, float) for name, value in values.items()}
+
+
+def _scalars(a: float, b: float, c: float) -> tuple[Array, Array, Array]:
+    return jnp.asarray(float(a)), jnp.asarray(float(b)), jnp.asarray(float(c))
 
 
 def _interval(times):

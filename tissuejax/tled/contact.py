@@ -14,10 +14,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from tissuejax import tensors
 from tissuejax.elements.element import parts
 from tissuejax.tled import native
 from tissuejax.tled.internal import add, barrier, take
-from tissuejax.tled.scene import Probe, Scene
+from tissuejax.tled.scene import Probe, Scene, filled
+from tissuejax.tled.shapes import Vector
 
 BONDED = 4.0  # a point that comes as near as zero gap is bonded by 98 %, however lightly it is pressed
 PIERCED = 0.05  # penetration over the probe's radius from which contact no longer holds
@@ -58,7 +60,7 @@ class Patch(NamedTuple):
 
 def patch(scene: Scene) -> Patch:
     """The facets of the scene's contact patch."""
-    nodes = scene.probe.patch.T
+    nodes = scene.pressed.patch.T
     return Patch(scene.body.points.T.at[:, nodes].get(mode="promise_in_bounds"), nodes)
 
 
@@ -79,17 +81,18 @@ class Touch(NamedTuple):
     rubbed: Float[Array, ""] | None = None
 
 
-def places(patch: Patch, u: Float[Array, "3 N"], centre: Float[Array, " 3"], shape: np.ndarray):
+def places(patch: Patch, u: Float[Array, "3 N"], centre: Float[Array, " 3"], shape: np.ndarray) -> Vector:
     """Contact points relative to the probe's reference point, three arrays (q, P); one component at a time, see
     `internal.take`."""
     return _placed(patch.x, take(u, patch.nodes), centre, shape)
 
 
-def _placed(x, ue, centre, shape):
+def _placed(x, ue, centre, shape) -> Vector:
     """`places` of corners at rest `x` and their displacements `ue`, each (3, v, P)."""
     weights = jnp.asarray(shape, ue[0].dtype)[:, :, None]
     at = barrier(sum(weights[:, a] * (x[:, a] + ue[:, a])[:, None] for a in range(x.shape[1])) - centre[:, None, None])
-    return tuple(parts(at))
+    x, y, z = parts(at)
+    return x, y, z
 
 
 def total(x: Float[Array, "r n"]) -> Float[Array, ""]:
@@ -115,9 +118,9 @@ class Pressed(NamedTuple):
     """What each facet does: forces at its points and its corners, N, where the points are from the probe, m, the
     memory, and what friction lost by sliding, J (None without friction)."""
 
-    f: tuple[Float[Array, "q P"], ...]
-    at_nodes: tuple[Float[Array, "v P"], ...]
-    x: tuple[Float[Array, "q P"], ...]
+    f: Float[Array, "3 q P"]
+    at_nodes: Float[Array, "3 v P"]
+    x: Vector
     grip: Grip
     lost: Float[Array, "q P"] | None
 
@@ -144,7 +147,7 @@ def by_facet(probe: Probe, x, ue, centre: Float[Array, " 3"], grip: Grip) -> Pre
     push, bond = pressure, grip.bond
     if probe.adhesion is not None:
         touched = jax.nn.sigmoid(BONDED - gap / probe.softness)
-        bond = jnp.where(gap > BREAK * probe.reach, 0.0, jnp.maximum(bond, touched))
+        bond = jnp.where(gap > BREAK * probe.reach, 0.0, jnp.maximum(filled(bond), touched))
         opening = jnp.maximum(gap, 0.0) / probe.reach
         push = pressure - probe.adhesion * bond * opening * jnp.exp(1.0 - opening)
     traction, anchor = tuple(push * n for n in normal), grip.anchor  # on the tissue: away from the probe
@@ -155,7 +158,7 @@ def by_facet(probe: Probe, x, ue, centre: Float[Array, " 3"], grip: Grip) -> Pre
         traction = tuple(t + d for t, d in zip(traction, drag, strict=True))
     f = barrier(jnp.stack(traction) * probe.area)
     weights = jnp.asarray(shape, gap.dtype)[:, :, None]
-    at_nodes = sum(weights[q] * f[:, q][:, None] for q in range(shape.shape[0]))
+    at_nodes = tensors.total(weights[q] * f[:, q][:, None] for q in range(shape.shape[0]))
     return Pressed(f, at_nodes, x, Grip(anchor, bond), lost)
 
 
@@ -179,7 +182,7 @@ def _friction(probe, x, normal, pressure, anchor):
 
 def breadth(scene: Scene) -> Float[Array, ""]:
     """Radius of the probe, or a tenth of the body's height under one without (a platen), m."""
-    reach = jnp.asarray(scene.probe.shape.reach(), scene.body.points.dtype)
+    reach = jnp.asarray(scene.pressed.shape.reach(), scene.body.points.dtype)
     return jnp.where(jnp.isfinite(reach), reach, 0.1 * jnp.ptp(scene.body.points[:, 2]))
 
 

@@ -16,6 +16,7 @@ from jaxtyping import Array, Float, Int
 
 from tissuejax.cohesion.engine import Memory, Vector, pull, stored, whole
 from tissuejax.cohesion.law import Law
+from tissuejax.tensors import total
 
 barrier = jax.lax.optimization_barrier
 
@@ -118,7 +119,7 @@ def by_face(
     acting = pull(faces.law, faces.values, faces.stiffness, faces.contact, gap, normal, memory)
     f = barrier(jnp.stack(acting.traction) * faces.area)
     shape = jnp.asarray(quadrature(low.shape[1], len(faces.area))[0], f.dtype)[:, :, None]
-    at = sum(shape[q] * f[:, q][:, None] for q in range(shape.shape[0]))
+    at = total(shape[q] * f[:, q][:, None] for q in range(shape.shape[0]))
     return Held(at, acting.memory, acting.lost * faces.area)
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from tissuejax.tled.scene import Scene
+from tissuejax.tled.scene import Scene, filled
 
 
 class Glide(NamedTuple):
@@ -32,7 +32,7 @@ def glide(scene: Scene, mass: Float[Array, " N"], area: Float[Array, " F"]) -> G
     modes = jnp.stack([jnp.stack([one, zero]), jnp.stack([zero, one]), jnp.stack([-y, x])])
     inertia = jnp.sum(mass * modes**2, axis=(1, 2))
     first = 2 * scene.settings.mass_damping
-    s = first**2 * scene.support.compliance * jnp.sum(mass) / jnp.sum(area)
+    s = first**2 * filled(scene.support.compliance) * jnp.sum(mass) / jnp.sum(area)
     return Glide(modes, inertia, jnp.clip(s, 1.0, scene.clock.compression**2) - 1.0)
 
 
@@ -50,7 +50,7 @@ def spurred(
         f: net internal and external force on the nodes.
         elastic: slip of the fixed nodes on the bedding's springs, m; these pull back with area / compliance.
     """
-    c = scene.support.compliance
+    c = filled(scene.support.compliance)
     back = jnp.where(c > 0, area * elastic / jnp.where(c > 0, c, 1.0), 0.0)
     net = f[:2].at[:, scene.body.fixed].add(-back, mode="promise_in_bounds")
     push = glide.extra * jnp.einsum("kcn,cn->k", glide.modes, net) / glide.inertia

@@ -17,7 +17,7 @@ from tissuejax.energies.strain import Strain
 from tissuejax.tensors import Sym
 from tissuejax.tled import native
 from tissuejax.tled.history import relax
-from tissuejax.tled.scene import Scene
+from tissuejax.tled.scene import Scene, filled
 
 barrier = jax.lax.optimization_barrier
 LINE = 64  # elements are padded to whole vectors and cache lines: an odd number costs up to half as much again
@@ -175,15 +175,15 @@ def stress(scene: Scene, mesh: Mesh, C: Sym, history: History, step) -> tuple[tu
         psi, instant = isochoric(scene, mesh, C)
         if tissue.damage is not None:
             bare = jnp.where(mesh.stiffness > 0, mesh.stiffness, 1.0)
-            greatest = jnp.maximum(greatest, psi)
+            greatest = jnp.maximum(filled(greatest), psi)
             loss = tissue.damage.loss(greatest / bare, psi / bare)
             lost.append(tuple(loss * i for i in instant))
             instant = tuple(i - loss * i for i in instant)
         if tissue.prony is not None:
-            relaxed, gone = relax(tissue.prony, relaxed, instant, step)
+            relaxed, gone = relax(tissue.prony, filled(relaxed), instant, step)
             lost.append(gone)
     if tissue.drain is not None and not averaged:
-        drained, gone = relax(tissue.drain, drained, _volumetric_gradient(scene, mesh, C), step)
+        drained, gone = relax(tissue.drain, filled(drained), _volumetric_gradient(scene, mesh, C), step)
         lost.append(gone)
     for gone in barrier(lost):
         S = tuple(s - g for s, g in zip(S, gone, strict=True))
@@ -210,7 +210,7 @@ def averaged_pressure(scene: Scene, mesh: Mesh, F) -> tuple[Float[Array, " E"], 
 
     def average(x):
         shares = add(jnp.broadcast_to(V * x / k, (k, len(V))), mesh.cells, count)
-        return shares / mesh.nodal_volume
+        return shares / filled(mesh.nodal_volume)
 
     Ja, factor = average(determinant(F)), average(mesh.stiffness)
     U, slope = jax.vjp(lambda J: factor * tissue.volumetric.energy(tissue.volumetric_values, J), Ja)
@@ -284,5 +284,6 @@ def internal_energy(scene: Scene, mesh: Mesh, u: Float[Array, "3 N"]):
     V = mesh.reference.volume
     if scene.body.element.averaged_pressure:
         psi = mesh.stiffness * _isochoric_energy(scene, Strain.of(cauchy_green(F)))
-        return jnp.sum(V * psi) + jnp.sum(mesh.nodal_volume * averaged_pressure(scene, mesh, F)[1]), J, hourglass
+        U = averaged_pressure(scene, mesh, F)[1]
+        return jnp.sum(V * psi) + jnp.sum(filled(mesh.nodal_volume) * U), J, hourglass
     return jnp.sum(V * mesh.stiffness * energy_density(scene, cauchy_green(F))), J, hourglass

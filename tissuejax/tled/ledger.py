@@ -17,6 +17,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from tissuejax.tensors import total
 from tissuejax.tled import capsule, contact, faces, internal
 
 
@@ -60,7 +61,7 @@ class Balance(NamedTuple):
     @property
     def accounted(self) -> Float[Array, " n"]:
         """Sum of where the work went, J."""
-        return sum(self[2:12])
+        return total(self[2:12])
 
     @property
     def error(self) -> Float[Array, " n"]:

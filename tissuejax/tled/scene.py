@@ -12,7 +12,7 @@ Lengths of the model: m, s, kg, N, Pa. Frame: z up, the support below, a probe p
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import equinox as eqx
 import jax
@@ -28,6 +28,14 @@ from tissuejax.parameters import Constants
 from tissuejax.tled.faces import Faces
 from tissuejax.tled.history import Damage, Prony
 from tissuejax.tled.shapes import Shape
+
+Content = TypeVar("Content")
+
+
+def filled(slot: Content | None) -> Content:
+    """The content of a slot that is filled in every scene that comes here, as the caller has made sure."""
+    assert slot is not None, "an empty slot"
+    return slot
 
 
 class Body(eqx.Module):
@@ -247,18 +255,19 @@ class Scene(eqx.Module):
         return jax.tree.map(one, self)
 
 
-def _put(part, keys, value, path):
-    names = [f.name for f in dataclasses.fields(part)] if dataclasses.is_dataclass(part) else []
+def _put(part: Any, keys: list[str], value: Any, path: str) -> Any:
     if isinstance(part, Mapping):
         return {**part, keys[0]: value}
-    if keys[0] not in names:
+    if keys[0] not in _names(part):
         raise unknown("slot of a scene", path, _paths(part, path[: -len(".".join(keys))]))
     if len(keys) > 1:
         value = _put(getattr(part, keys[0]), keys[1:], value, path)
     return dataclasses.replace(part, **{keys[0]: value})
 
 
-def _paths(part, prefix):
-    return (
-        [prefix + f.name for f in dataclasses.fields(part)] if dataclasses.is_dataclass(part) else [prefix + "(none)"]
-    )
+def _names(part: Any) -> list[str]:
+    return [f.name for f in dataclasses.fields(part)] if dataclasses.is_dataclass(part) else []
+
+
+def _paths(part: Any, prefix: str) -> list[str]:
+    return [prefix + name for name in _names(part) or ["(none)"]]

@@ -239,7 +239,7 @@ def refuse_blade(blade: Wedge) -> None:
 def _refuse_inside(blade: Wedge, split: Split, tip, at: float) -> None:
     place = np.array([np.interp(at, np.arange(len(tip)), tip[:, i]) for i in range(3)])
     x = np.asarray(split.geometry.points)[split.minus].mean(1) - place
-    gap, _ = blade.distance(tuple(jnp.asarray(x[:, i]) for i in range(3)))
+    gap, _ = blade.distance((jnp.asarray(x[:, 0]), jnp.asarray(x[:, 1]), jnp.asarray(x[:, 2])))
     deep = -float(np.min(np.asarray(gap)))
     if deep > 0.1 * float(blade.thickness):
         raise InputError(

@@ -47,7 +47,7 @@ class Sphere(Shape):
     def distance(self, x: Vector) -> tuple[Array, Vector]:
         r = _length(*x)
         safe = jnp.where(r > 0, r, 1.0)
-        return r - self.radius, tuple(p / safe for p in x)
+        return r - self.radius, (x[0] / safe, x[1] / safe, x[2] / safe)
 
     def reach(self) -> Any:
         return self.radius

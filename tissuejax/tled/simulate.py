@@ -27,7 +27,7 @@ from jaxtyping import Array, Float, Int
 
 from tissuejax.tled import contact, internal, verdict
 from tissuejax.tled.ledger import Balance, balance, look
-from tissuejax.tled.scene import Scene
+from tissuejax.tled.scene import Scene, filled
 from tissuejax.tled.step import Drive, Felt, Machine, State, advance, machine, start, summed
 
 COMPILER_OPTIONS = {
@@ -143,12 +143,14 @@ def proceed(m: Machine, state: State) -> Outcome:
         none = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), jax.eval_shape(advance, m, state, first)[1])
         (state, total), _ = jax.lax.scan(one, (state, none), drive, length=clock.steps)
         total = summed(total)
-        mean = Felt(*(x / clock.steps for x in total[:3]), total.work, total.spent)
+        force, torque, reaction = (x / clock.steps for x in total[:3])
+        mean = Felt(force, torque, reaction, total.work, total.spent)
         looked = None
         if scene.faces is not None:
-            centre = None if drive.centre is None else drive.centre[-1] + 0.5 * drive.stride[-1]
-            given = centre if state.felt is None else centre + scene.probe.compliance * jnp.mean(state.felt, 0)
-            looked = look(m, state, given)
+            centre = None if drive.centre is None else drive.centre[-1] + 0.5 * filled(drive.stride)[-1]
+            if state.felt is not None:
+                centre = filled(centre) + filled(scene.pressed.compliance) * jnp.mean(state.felt, 0)
+            looked = look(m, state, centre)
         return state, (mean, _markers(scene, state.u), _pace(m, state, drive), looked)
 
     def block(state, drive):
@@ -203,7 +205,7 @@ def drives(scene: Scene, frames: int) -> Drive:
         path = path if probe.offset is None else path + probe.offset
         centre, stride = path[1:-1], 0.5 * (path[2:] - path[:-2])
     if support.displacement is not None:
-        path = series(support.time, support.displacement, clock.start + real * jnp.arange(count + 1))
+        path = series(filled(support.time), support.displacement, clock.start + real * jnp.arange(count + 1))
         motion = path[1:]
         if support.pattern is None:  # parts that move apart carry no body along
             pace = (path[1:] - path[:-1]) / clock.step
@@ -241,8 +243,9 @@ def _depth(frozen: tuple[Machine, State], drive: Drive) -> Float[Array, ""]:
     if drive.centre is None:
         return jnp.asarray(-jnp.inf, state.u.dtype)
     centre = jax.lax.stop_gradient(drive.centre[-1])
-    centre = centre if state.felt is None else centre + m.scene.probe.compliance * state.felt[0]
-    return contact.depth(m.scene.probe, m.patch, state.u, centre)
+    probe = m.scene.pressed
+    centre = centre if state.felt is None else centre + filled(probe.compliance) * state.felt[0]
+    return contact.depth(probe, filled(m.patch), state.u, centre)
 
 
 def _checks(m: Machine, state: State, deep: Float[Array, ""]) -> Checks:

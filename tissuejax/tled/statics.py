@@ -17,7 +17,7 @@ from jaxtyping import Array, Float, Int
 
 from tissuejax.errors import NotConverged
 from tissuejax.tled import capsule, contact, internal, loads, stable, support, verdict
-from tissuejax.tled.scene import Scene
+from tissuejax.tled.scene import Scene, filled
 from tissuejax.tled.simulate import COMPILER_OPTIONS, series
 
 CHECK = 25  # iterations between two looks at the residual
@@ -63,7 +63,7 @@ def load(scene: Scene, time: float = 0.0) -> Load:
     hold = support.hold(scene.put({"support.compliance": None, "support.fluidity": None}), None)
     motion, patch, centre = None, None, None
     if scene.support.displacement is not None:
-        motion = series(scene.support.time, scene.support.displacement, jnp.asarray([time]))[0]
+        motion = series(filled(scene.support.time), scene.support.displacement, jnp.asarray([time]))[0]
     diagonal = stable.nodal_stiffness(scene, mesh)
     if scene.probe is not None:
         probe = scene.probe
@@ -97,13 +97,18 @@ def pull(at: Load, u: Float[Array, "3 N"]) -> tuple[Float[Array, "3 N"], Float[A
     scene = at.scene
     inner, _ = internal.forces(scene, at.mesh, u, long_term(scene, at.mesh), jnp.inf)
     if at.skin is not None:
-        inner = inner + capsule.forces(at.skin, scene.tissue.capsule, u)
+        inner = inner + capsule.forces(at.skin, filled(scene.tissue.capsule), u)
     outer = jnp.zeros_like(u) if scene.gravity is None else scene.gravity[:, None] * at.mesh.mass
     if at.factor is not None:
         outer = outer + loads.forces(scene.loads, scene.body.points, u, at.factor)
     if at.patch is not None:
-        outer = outer + contact.forces(scene.probe, at.patch, u, at.centre, contact.untouched(scene.probe)).nodal
+        outer = outer + _touch(at, at.patch, u).nodal
     return inner, outer
+
+
+def _touch(at: Load, patch: contact.Patch, u: Float[Array, "3 N"]) -> contact.Touch:
+    probe = at.scene.pressed
+    return contact.forces(probe, patch, u, filled(at.centre), contact.untouched(probe))
 
 
 def unbalanced(at: Load, w: Float[Array, "3 N"]) -> Float[Array, "3 N"]:
@@ -210,7 +215,7 @@ def equilibrium(
     u = jnp.where((residual <= tolerance) & ~inverted, u, jnp.nan)
     force = jnp.zeros(3, u.dtype)
     if at.patch is not None:
-        force = contact.forces(at.scene.probe, at.patch, u, at.centre, contact.untouched(at.scene.probe)).force
+        force = _touch(at, at.patch, u).force
     return Equilibrium(u.T, residual, count.astype(int), force, inverted)
 
 

@@ -14,7 +14,7 @@ from tissuejax.tled import capsule, contact, faces, internal, loads, stable, sup
 from tissuejax.tled.glide import Glide, glide, spurred
 from tissuejax.tled.internal import barrier
 from tissuejax.tled.ledger import Spent
-from tissuejax.tled.scene import Scene
+from tissuejax.tled.scene import Scene, filled
 
 
 class Machine(NamedTuple):
@@ -86,7 +86,7 @@ def machine(scene: Scene) -> Machine:
     skin = None if scene.tissue.capsule is None else capsule.skin(scene.body)
     patch = None if probe is None else contact.patch(scene)
     hold = support.hold(scene, stiffness)
-    slides = None if scene.support.compliance is None else glide(scene, mass, hold.area)
+    slides = None if scene.support.compliance is None else glide(scene, mass, filled(hold.area))
     touched = probe is not None or scene.faces is not None
     corners = surface.corners(patch, scene.faces, len(scene.body.points)) if touched else None
     return Machine(scene, mesh, hold, patch, skin, mass, weight, slides, seam, corners)
@@ -99,16 +99,17 @@ def start(m: Machine) -> State:
     """
     scene, u = m.scene, internal.settled(m.scene)
     v = jnp.zeros_like(u)
-    if scene.support.displacement is not None and scene.support.pattern is None:
-        clock, path = scene.clock, scene.support
+    moved = scene.support.displacement
+    if moved is not None and scene.support.pattern is None:
+        clock, time = scene.clock, filled(scene.support.time)
         real = clock.step * clock.compression
         at = clock.start + real * jnp.arange(2)
-        place = jnp.stack([jnp.interp(at, path.time, x) for x in path.displacement.T]).astype(u.dtype)
+        place = jnp.stack([jnp.interp(at, time, x) for x in moved.T]).astype(u.dtype)
         u = u + place[:, :1]
         v = v + (place[:, 1:] - place[:, :1]) / clock.step
     if m.weight is not None and scene.body.settled is None:
         zero = jnp.zeros_like(scene.body.held.T[:2])
-        pull = m.weight if m.glide is None else spurred(scene, m.glide, m.weight, zero, m.hold.area, m.mass)
+        pull = m.weight if m.glide is None else spurred(scene, m.glide, m.weight, zero, filled(m.hold.area), m.mass)
         v = jnp.where(m.hold.held, 0.0, -0.5 * scene.clock.step * pull / m.mass)
     grip = None if scene.probe is None else contact.untouched(scene.probe)
     compliant = scene.probe is not None and scene.probe.compliance is not None
@@ -125,7 +126,7 @@ def tissue_forces(m: Machine, u: Float[Array, "3 N"], history: internal.History,
 
     f, history = jax.checkpoint(evaluate, prevent_cse=False)(m.scene, m.mesh, u, history, step)
     if m.skin is not None:
-        f = f + capsule.forces(m.skin, m.scene.tissue.capsule, u)
+        f = f + capsule.forces(m.skin, filled(m.scene.tissue.capsule), u)
     return f, history
 
 
@@ -137,27 +138,32 @@ def advance(m: Machine, state: State, drive: Drive) -> tuple[State, Felt]:
     inner, history = tissue_forces(m, u + settings.stiffness_damping * v, state.history, real)
     outer = jnp.zeros_like(u) if m.weight is None else m.weight + 0.0
     if scene.loads is not None:
-        outer = outer + loads.forces(scene.loads, scene.body.points, u, drive.load)
+        outer = outer + loads.forces(scene.loads, scene.body.points, u, filled(drive.load))
     none = jnp.zeros((3, 1), u.dtype)
     force = torque = none
     work, grip, felt, opening = none[0], state.grip, state.felt, state.opening
     acting = None
     if m.corners is not None:
-        centre = drive.centre if felt is None else drive.centre + scene.probe.compliance * felt[0]
+        centre = drive.centre
+        if felt is not None:
+            centre = filled(centre) + filled(scene.pressed.compliance) * felt[0]
         acting = _surface(m, u, centre, grip, opening)
         grip, opening = acting.grip, acting.memory
     if scene.probe is not None:
-        force, torque = acting.force, acting.torque
-        work = -jnp.sum(force * drive.stride[:, None], 0)
+        touch = filled(acting)
+        force, torque = filled(touch.force), filled(touch.torque)
+        work = -jnp.sum(force * filled(drive.stride)[:, None], 0)
         if felt is not None:
             new = _given_way(m, jnp.sum(force, 1), felt[0], u, centre, state)
             # the tip moves on its spring too: its way from half a step before to half a step after, as the path's is
-            work = work - jnp.sum(force * (0.5 * scene.probe.compliance * (new - felt[1]))[:, None], 0)
+            work = work - jnp.sum(force * (0.5 * filled(scene.probe.compliance) * (new - felt[1]))[:, None], 0)
             felt = jnp.stack([new, felt[0]])
     f = outer - inner
     f = f if acting is None else surface.added(acting, f)
     half = 0.5 * settings.mass_damping * h
-    moving = f if m.glide is None else spurred(scene, m.glide, f, state.slip.elastic, m.hold.area, m.mass)
+    moving = f
+    if m.glide is not None:
+        moving = spurred(scene, m.glide, f, filled(state.slip.elastic), filled(m.hold.area), m.mass)
     driven = (1.0 - half) * v + h * moving / m.mass
     driven = driven if drive.pace is None else driven + 2.0 * half * drive.pace[:, None]
     pushed = driven / (1.0 + half)
@@ -167,7 +173,7 @@ def advance(m: Machine, state: State, drive: Drive) -> tuple[State, Felt]:
     pushed = jnp.where(m.hold.held, (moved - u) / h, pushed)
     moved, pushed = barrier((moved, pushed))
     reaction = jnp.sum(scene.body.held.T * f[:, scene.body.fixed], axis=1)  # force of the tissue on the support
-    spent = None if scene.faces is None else _spent(m, acting, inner, f, v, pushed)
+    spent = None if scene.faces is None else _spent(m, filled(acting), inner, f, v, pushed)
     return State(moved, pushed, history, grip, slip, felt, opening), Felt(force, torque, reaction, work, spent)
 
 
@@ -181,7 +187,7 @@ def _spent(m: Machine, acting: surface.Acting, inner, f, v, pushed) -> Spent:
     if scene.support.displacement is not None:
         shove = jnp.sum(jnp.where(m.hold.held, mean * (m.mass * (pushed - v) - h * f), 0.0), 0)
     rubbed = zero if acting.rubbed is None else acting.rubbed
-    return Spent(acting.lost, rubbed, damping, h * jnp.sum(inner * mean, 0), shove)
+    return Spent(filled(acting.lost), rubbed, damping, h * jnp.sum(inner * mean, 0), shove)
 
 
 def _given_way(m: Machine, force, felt, u, centre, state) -> Float[Array, " 3"]:
@@ -192,8 +198,8 @@ def _given_way(m: Machine, force, felt, u, centre, state) -> Float[Array, " 3"]:
     compliance times stiffness is large (the blade chatters, and the balance of energies is open by more than the
     work); half of Newton's step lags like a dashpot, which takes 1.4 % of the work of a blade that rubs.
     """
-    compliance = jnp.broadcast_to(m.scene.probe.compliance, 3)
-    total = lambda at: jnp.sum(_surface(m, u, at, state.grip, state.opening).force, 1)  # noqa: E731
+    compliance = jnp.broadcast_to(filled(m.scene.pressed.compliance), 3)
+    total = lambda at: jnp.sum(filled(_surface(m, u, at, state.grip, state.opening).force), 1)  # noqa: E731
     stiffness = -jax.jacfwd(total)(centre)
     step = jnp.linalg.solve(jnp.eye(3, dtype=u.dtype) + stiffness * compliance, force - felt)
     return felt + step

@@ -7,6 +7,7 @@ make the stored states readable in ParaView.
 """
 
 from pathlib import Path
+from typing import TypeVar
 
 import h5py
 import jax
@@ -22,6 +23,7 @@ from tissuejax.tled.step import State, machine, start
 
 CHUNK = 64
 SILENT = Silent()
+Item = TypeVar("Item", h5py.Group, h5py.Dataset)
 CHANNELS = ("time", "end_time", "force", "torque", "reaction", "work", "markers")
 
 
@@ -94,28 +96,41 @@ def _tell_probe(file: h5py.File, probe) -> None:
     file["probe/radius"] = float(probe.shape.reach())
 
 
+def _stored(file: h5py.File, name: str, kind: type[Item]) -> Item:
+    found = file[name]
+    if not isinstance(found, kind):
+        raise InputError(f"{file.filename}: found no {kind.__name__} {name}, expected a file of states")
+    return found
+
+
+def _cell_type(file: h5py.File) -> str:
+    return str(file.attrs["cell_type"])
+
+
 def _append(file: h5py.File, name: str, values) -> None:
     values = np.asarray(values)
     if name not in file:
         file.create_dataset(name, data=values, maxshape=(None, *values.shape[1:]), chunks=True)
         return
-    old = len(file[name])
-    file[name].resize(old + len(values), axis=0)
-    file[name][old:] = values
+    series = _stored(file, name, h5py.Dataset)
+    old = len(series)
+    series.resize(old + len(values), axis=0)
+    series[old:] = values
 
 
 def _save(file: h5py.File, state: State) -> None:
     for i, leaf in enumerate(jax.tree.leaves(state)):
         name = f"resume/{i}"
         if name in file:
-            file[name][...] = np.asarray(leaf)
+            _stored(file, name, h5py.Dataset)[...] = np.asarray(leaf)
         else:
             file[name] = np.asarray(leaf)
 
 
 def _load(file: h5py.File, like: State, path: Path) -> State:
     leaves, tree = jax.tree.flatten(like)
-    stored = [file[f"resume/{i}"][...] for i in range(len(file["resume"]))]
+    count = len(_stored(file, "resume", h5py.Group))
+    stored = [_stored(file, f"resume/{i}", h5py.Dataset)[...] for i in range(count)]
     if [s.shape for s in stored] != [leaf.shape for leaf in leaves]:
         raise InputError(f"{path} holds the run of another scene (states of other shapes); give a new file name")
     return jax.tree.unflatten(tree, [jnp.asarray(s) for s in stored])
@@ -125,8 +140,9 @@ def to_xdmf(path: str | Path, target: str | Path) -> Path:
     """The stored states as an XDMF time series for ParaView: a small text that points into the HDF5 file."""
     path, target = Path(path), Path(target)
     with h5py.File(path) as file:
-        times, kind = file["states/time"][...], file.attrs["cell_type"].capitalize().replace("Tetra", "Tetrahedron")
-        points, cells = file["points"].shape, file["cells"].shape
+        times = _stored(file, "states/time", h5py.Dataset)[...]
+        kind = _cell_type(file).capitalize().replace("Tetra", "Tetrahedron")
+        points, cells = (_stored(file, name, h5py.Dataset).shape for name in ("points", "cells"))
 
     def item(name, shape, number):
         size = " ".join(map(str, shape))
@@ -148,8 +164,8 @@ def to_xdmf(path: str | Path, target: str | Path) -> Path:
 def to_vtu(path: str | Path, target: str | Path, index: int = -1) -> Path:
     """One stored state as a mesh file (VTU or whatever meshio makes of the suffix), displacement as point data."""
     with h5py.File(path) as file:
-        states = file["states/displacement"]
-        k = range(len(states))[index]
-        cells = [(file.attrs["cell_type"], file["cells"][...])]
-        meshio.Mesh(file["points"][...], cells, {"displacement": states[str(k)][...]}).write(target)
+        k = range(len(_stored(file, "states/displacement", h5py.Group)))[index]
+        names = ("points", "cells", f"states/displacement/{k}")
+        points, cells, displacement = (_stored(file, name, h5py.Dataset)[...] for name in names)
+        meshio.Mesh(points, [(_cell_type(file), cells)], {"displacement": displacement}).write(target)
     return Path(target)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from tissuejax.tled.scene import Scene
+from tissuejax.tled.scene import Scene, filled
 
 
 class Hold(NamedTuple):
@@ -40,7 +40,7 @@ def hold(scene: Scene, stiffness: Float[Array, " N"] | None) -> Hold:
     pattern = zero.at[:, body.fixed].set(pattern.T)
     if not slips(scene):
         return Hold(held, pattern, None, None)
-    return Hold(held, pattern, footprint(scene), stiffness[body.fixed])
+    return Hold(held, pattern, footprint(scene), filled(stiffness)[body.fixed])
 
 
 def slips(scene: Scene) -> bool:
@@ -81,18 +81,19 @@ def slide(
     """
     support, clock = scene.support, scene.clock
     h, half = clock.step, 0.5 * scene.settings.mass_damping * clock.step
-    bare = hold.area <= 0
-    area = jnp.where(bare, 1.0, hold.area)
+    whole = filled(hold.area)
+    bare = whole <= 0
+    area = jnp.where(bare, 1.0, whole)
     elastic, viscous, speed = slip
     if elastic is not None:
-        m, c = mass[scene.body.fixed], support.compliance
-        push = c * ((1.0 - half) * m * speed + h * moving[:2, scene.body.fixed]) - h * area * elastic
+        m, c = mass[scene.body.fixed], filled(support.compliance)
+        push = c * ((1.0 - half) * m * filled(speed) + h * moving[:2, scene.body.fixed]) - h * area * elastic
         speed = jnp.where(bare, 0.0, push / (c * (1.0 + half) * m + h * h * area))
         elastic = elastic + h * speed
     if viscous is not None:
         traction = jnp.where(bare, 0.0, f[:2, scene.body.fixed] / area)
-        stiffness = hold.pull / area  # Pa/m, an upper estimate: what the tissue gives back per slip
-        creep = support.fluidity * h * clock.compression
+        stiffness = filled(hold.pull) / area  # Pa/m, an upper estimate: what the tissue gives back per slip
+        creep = filled(support.fluidity) * h * clock.compression
         viscous = viscous + creep * traction / (1.0 + creep * stiffness)
     return Slip(elastic, viscous, speed)
 

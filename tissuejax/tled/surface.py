@@ -11,9 +11,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from tissuejax.tensors import total
 from tissuejax.tled import contact, faces, native
 from tissuejax.tled.internal import barrier
-from tissuejax.tled.scene import Probe
+from tissuejax.tled.scene import Probe, filled
 
 
 class Acting(NamedTuple):
@@ -60,8 +61,8 @@ def forces(
 ) -> Acting:
     """Forces of a probe whose reference point is at `centre`, and of the faces, at displacements u."""
     touch = None if probe is None else native.contact(contact.by_facet, probe, patch, grip)
-    hold = None if joint is None else native.faces(faces.by_face, joint, seam, memory)
-    sizes = [] if probe is None else [(patch.nodes.shape[1], touch is None)]
+    hold = None if joint is None else native.faces(faces.by_face, joint, filled(seam), memory)
+    sizes = [] if probe is None else [(filled(patch).nodes.shape[1], touch is None)]
     sizes += [] if joint is None else [(len(side), hold is None) for side in (joint.plus, joint.minus)]
     left = [n for n, mine in sizes if mine]  # what runs in C gathers and sums by itself
     begun, parted = 0 if touch is None else sizes[0][0], []
@@ -76,7 +77,7 @@ def forces(
         force, torque = -force[:, None], -torque[:, None]
         nodal.append(f)
     elif probe is not None:
-        pressed = contact.by_facet(probe, patch.x, parted.pop(0), centre, grip)
+        pressed = contact.by_facet(probe, filled(patch).x, parted.pop(0), filled(centre), filled(grip))
         f, x, grip, rubbed = pressed.f, pressed.x, pressed.grip, pressed.lost
         force = -jnp.sum(f, 1)
         torque = -jnp.stack([jnp.sum(x[i - 2] * f[i - 1] - x[i - 1] * f[i - 2], 0) for i in range(3)])
@@ -85,11 +86,12 @@ def forces(
         f, memory, lost = hold(u)
         nodal.append(f)
     elif joint is not None:
-        held = faces.by_face(joint, seam.x, *parted, memory)
+        high, low = parted
+        held = faces.by_face(joint, filled(seam).x, high, low, filled(memory))
         memory, lost = held.memory, held.lost
         done += [held.at, -held.at]
     at = barrier(jnp.concatenate(done, 2)) if done else None
-    own = sum(nodal) if nodal else None
+    own = total(nodal) if nodal else None
     return Acting(own, at, index if done else None, force, torque, grip, rubbed, memory, lost)
 
 

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tissuejax.arrays import Given
 from tissuejax.errors import UnstableSimulation
 from tissuejax.tled import contact
 from tissuejax.tled.scene import Scene
@@ -17,7 +18,7 @@ NEAR = 1.0  # radii around the probe's patch within which a breakdown is put dow
 
 def halved(scene: Scene) -> Scene:
     """The same scene with half the step; the static mass of contact goes with its square."""
-    changes = {"clock.steps": 2 * scene.clock.steps}
+    changes: dict[str, Given] = {"clock.steps": 2 * scene.clock.steps}
     if scene.probe is not None:
         changes["probe.mass"] = scene.probe.mass / 4
     if scene.faces is not None:

@@ -62,7 +62,8 @@ def named(text: str) -> str:
     name = "tissuejax_" + hashlib.sha256(f"{_around()}\n{text}".encode()).hexdigest()[:32]
     with _lock:
         if name not in _loaded:
-            where = jax.config.jax_compilation_cache_dir  # that of `cache.programs`, unless JAX was told of another
+            # that of `cache.programs`, unless JAX was told of another
+            where = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]: made at run time
             kept = None if where is None or "://" in where or not own(Path(where)) else Path(where) / KEPT
             found = _load(kept / f"{name}.so") if kept is not None else None
             if found is None:

@@ -15,6 +15,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import ShapedArray
 from jax.extend import core
 from jax.interpreters import ad, batching, mlir
 
@@ -186,7 +187,7 @@ def plain(cells, *arguments, kernel: Kernel, batched, count: int) -> list[Any]:
 
 
 def _abstract(cells, *arguments, kernel: Kernel, batched, count: int):
-    return [jax.core.ShapedArray(s.shape, s.dtype) for s in _avals(kernel, batched, count, cells, arguments)]
+    return [ShapedArray(s.shape, s.dtype) for s in _avals(kernel, batched, count, cells, arguments)]
 
 
 def _differentiated(primals, tangents, *, kernel: Kernel, batched, count: int):

@@ -5,6 +5,7 @@ from typing import Any
 
 import jax
 import numpy as np
+from jax.core import ShapedArray
 from jax.extend import core
 
 from tissuejax.tled.lanes.tape import Node, Tape
@@ -43,6 +44,7 @@ def walk(jaxpr: core.Jaxpr, consts: Sequence[Any], inputs: Sequence[Objects], ta
     for eqn in jaxpr.eqns:
         found = _done(eqn, [value(a) for a in eqn.invars], tape)
         for var, x in zip(eqn.outvars, found, strict=True):
+            assert isinstance(var.aval, ShapedArray)  # nothing else is computed with
             if x.shape != var.aval.shape:
                 raise Untold(f"{eqn.primitive.name} gave {x.shape} for {var.aval.shape}")
             known[var] = x
