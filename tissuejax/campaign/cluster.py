@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
 from multiprocessing import resource_tracker
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from tissuejax.campaign.engine import Engine, Report, work
 from tissuejax.campaign.store import Store
@@ -31,9 +31,9 @@ class Dask(Engine):
             InputError: dask.distributed is missing, or no scheduler answers at the address.
         """
         try:
-            import dask
+            import dask.config
             from distributed import Client, KilledWorker, LocalCluster, as_completed
-            from distributed.comm import CommClosedError
+            from distributed.comm.core import CommClosedError
         except ImportError as error:
             raise InputError("engine dask needs the extra `cluster`: pip install 'tissuejax[cluster]'") from error
         dask.config.set({"distributed.scheduler.allowed-failures": DEATHS, "distributed.worker.daemon": False})
@@ -41,10 +41,8 @@ class Dask(Engine):
         with quiet(), ExitStack() as ending:
             cluster = None
             if where is None:
-                cluster = LocalCluster(
-                    n_workers=0, threads_per_worker=1, processes=True, dashboard_address=None,
-                    silence_logs=logging.CRITICAL,
-                )  # fmt: skip
+                mute: dict[str, Any] = {"dashboard_address": None, "silence_logs": logging.CRITICAL}
+                cluster = LocalCluster(n_workers=0, threads_per_worker=1, processes=True, **mute)
                 ending.callback(cluster.close)
                 cluster.sync(deaf)
                 cluster.scale(workers)
