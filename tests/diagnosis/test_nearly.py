@@ -4,8 +4,12 @@ import numpy as np
 import pytest
 
 import tissuejax as tj
+from tissuejax.diagnosis.judgement.blocks import blocks, series
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, marginal
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
+from tissuejax.diagnosis.judgement.scales import Scales, scaled
+from tissuejax.diagnosis.material import MaterialBench, strain_states
+from tissuejax.energies.neo_hookean import NeoHookean
 from tissuejax.estimation.discrepancy import Done, Series, discrepancy
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
@@ -103,3 +107,35 @@ def test_a_recording_that_is_alone_in_its_mode_has_no_second_law():
     assert not np.any(own.factor)
     (own,) = (p for p in two(paced=False)[0].about(np.ones(80)) if p.name == "own law")
     assert np.all(np.any(own.factor[:40], axis=1))
+
+
+def relaxed(time: np.ndarray) -> Scales:
+    """The scales of two ramps and holds of a neo-Hookean base whose stress falls by 70 % within seconds."""
+    stretch = 1 + np.minimum(0.02 * time, 0.2)
+    held = 2 * 1000 * (stretch - stretch**-2)
+    recordings = {}
+    for name, size in (("a", 1.0), ("b", 1.3)):
+        channels = {"nominal_stress": Channel(time, size * held * (0.3 + 0.7 * np.exp(-time / 3)), "Pa", 5.0)}
+        recordings[name] = Recording(name, "uniaxial", {"time": time, "stretch": stretch}, channels)
+    energy = NeoHookean()
+    bench = MaterialBench.of(Sample("s", recordings), energy, ("a", "b"), (), {"a": 5.0, "b": 5.0})
+    cut = blocks(bench)
+    of = discrepancy(series(bench, cut, strain_states(bench)), cut.spread(bench.sigma), paced=True)
+    return scaled(bench, cut, of, bench.y, {p: bench.start[p] for p in bench.base})
+
+
+@pytest.mark.parametrize(("time", "least", "most"), [(1e-3, 0.0, 1e-3), (3.0, 0.1, 0.6)])
+def test_a_relaxation_that_is_over_at_once_does_nothing_and_has_nothing_wrong_with_it(time, least, most):
+    """Half of the stress is gone within a millisecond: the base with half its modulus predicts the same. Within
+    seconds, no modulus does; what is left then is what lies across the prediction, which is linear in the modulus."""
+    scales = relaxed(np.linspace(0.05, 20, 60))
+    bench, key = scales.bench, "viscoelasticity/one time"
+    g, tau = "effects.viscoelasticity.g1", "effects.viscoelasticity.tau1"
+    values = {**{p: bench.start[p] for p in bench.base}, g: 0.5, tau: time}
+    here = scales.cut.mean(bench.predict(values))
+    gone = scales.cut.mean(bench.predict({**values, g: 0.0})) - here
+    (part,) = (p for p in scales.about(bench.predict(values), bench, [key], values) if p.family == "effect")
+    errs = np.sqrt(np.sum(part.factor**2) / 2)  # of each row twice: alike in strain and time, and a gain
+    across = gone - here * (gone @ here) / (here @ here)
+    assert errs == pytest.approx(np.linalg.norm(across), rel=1e-3, abs=1e-4 * np.linalg.norm(gone))
+    assert least <= errs / np.linalg.norm(gone) < most

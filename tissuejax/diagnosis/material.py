@@ -66,8 +66,10 @@ def compiled(model: Model) -> Callable[[Float[Array, " p"], MaterialTest], Float
 
 
 def lengthened(test: MaterialTest) -> MaterialTest:
-    """`test` with its last sample repeated up to 128, 256, 512, ... samples: few lengths, few compilations."""
-    extra = max(SHORTEST, 2 ** math.ceil(math.log2(len(test.time)))) - len(test.time)
+    """`test` with its last sample repeated up to 128, 192, 256, 384, ... samples: few lengths, few compilations."""
+    power = max(SHORTEST, 2 ** math.ceil(math.log2(len(test.time))))
+    between = 3 * power // 4
+    extra = (between if power > SHORTEST and len(test.time) <= between else power) - len(test.time)
 
     def longer(series: np.ndarray) -> np.ndarray:
         return np.concatenate([series, np.repeat(series[-1:], extra, axis=0)])

@@ -120,7 +120,7 @@ def _passed(time: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
 
 @dataclass(frozen=True)
 class Done:
-    """What an effect does: the prediction less the one without it, Pa; whether its law knows times or rates."""
+    """What an effect does that the base model could not do in its place, Pa; whether its law knows times or rates."""
 
     change: Float[np.ndarray, " N"]
     timed: bool

@@ -17,6 +17,7 @@ from tissuejax.diagnosis.judgement.marginal import Blocked, Widths
 from tissuejax.estimation.discrepancy import Discrepancy, Done, Part
 
 CLOCKED = ("s", "1/s")  # units of parameters by which a law knows time
+ALIKE = 1e-6  # of the largest: a direction in which constants of the base do less than that is none of its own
 
 
 @dataclass
@@ -68,19 +69,35 @@ class Scales:
     def _done(
         self, here: Float[np.ndarray, " M"], bench: Bench, keys: Sequence[str], values: Mapping[str, float]
     ) -> list[Done]:
-        """What each effect of the tissue does: the prediction less the one with its amplitudes at neutral.
+        """What each effect of the tissue does that the base's constants could not do in its place: the prediction less
+        the one with its amplitudes at neutral, and of that what lies across all slopes of the base.
+
+        A relaxation that is long over at the first sample only makes the base softer: it does nothing, and has nothing
+        wrong with it, however much of the stress is gone.
 
         A fault of the rig is exactly what it is called: an offset, a lag, a hum of one frequency. A law without a time
         or a rate errs by no function of time: that is for another effect to explain.
         """
-        out = []
+        out, base = [], None
         for candidate in (bench.candidates[k] for k in keys):
             neutral = {a: bench.start[a] for a in candidate.amplitudes if a in values}
             if neutral and not candidate.rig:
                 without = self.cut.mean(bench.predict({**values, **neutral}))
                 timed = any(bench.free[p].unit in CLOCKED for p in candidate.paths)
-                out.append(Done(np.nan_to_num(here - without), timed))
+                change = np.nan_to_num(here - without)
+                base = self._base(bench, values) if base is None else base
+                out.append(Done(change - base @ (base.T @ change), timed))
         return out
+
+    def _base(self, bench: Bench, values: Mapping[str, float]) -> Float[np.ndarray, "M p"]:
+        """An orthonormal basis of what the base's constants can do about `values`."""
+        slopes = np.nan_to_num(self.cut.mean(bench.jacobian(values, bench.base, bench.fitted)))
+        sizes = np.linalg.norm(slopes, axis=0)
+        felt = sizes > 0
+        if not felt.any():
+            return np.zeros((len(slopes), 0))
+        turned, size, _ = np.linalg.svd(slopes[:, felt] / sizes[felt], full_matrices=False)
+        return turned[:, size > ALIKE * size[0]]
 
     def _known(self, name: str, error: Float[np.ndarray, "M ..."]) -> Part:
         """A known error of a simulation: by columns, or where its sign is not known of each block alone."""
