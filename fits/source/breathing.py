@@ -20,7 +20,7 @@ SITE, LAW, NAME = "site 3", "in-vivo-3", "breath"
 NEAREST = 0  # a marker 7 mm from the axis
 RANGE, FREQUENCY, PHASE = 4e-3, 0.25, 0.7  # m, 1/s (the source prints no rate), rad
 GAP, CALM = 3.5e-3, 8.0  # m above the tissue at rest, more than it is lifted; s out of contact, and held
-TURNS = 4  # of the factor; the force is nearly linear in it
+TURNS = 3  # of the factor; the force is nearly linear in it
 OFF = 1.4  # factor that the fits begin with
 
 
@@ -63,7 +63,7 @@ def recorded(study: dict) -> tuple[Sample, Recording]:
     blank = rig(study)
     sample = Sample("lobe", {NAME: blank}, columns(study["lobe"](), (16, 14, 6)), 1060.0)
     values = constants(study, 1.0) | motion(*(RANGE / 2 * np.array([np.cos(PHASE), np.sin(PHASE)])), FREQUENCY)
-    p = predictor(site_model(True), sample, settings=study["TRUTH"].changed(processes=1))
+    p = predictor(site_model(True), sample, settings=study["TRUTH"].changed(compression=8.0, processes=1))
     told = p.predict(values)[NAME]
     rng = np.random.default_rng([2012, 226])
     noisy = {
@@ -92,7 +92,7 @@ def read_off(sample: Sample) -> tuple[float, float, float]:
 
 def fitted(study: dict, sample: Sample, moved: dict[str, float]) -> dict:
     """The factor on the moduli that fits the force, and what is left: N, and mm by marker (eq. 2.2, 2.3)."""
-    p = predictor(site_model(bool(moved)), sample, settings=study["FIT"])
+    p = predictor(site_model(bool(moved)), sample, settings=study["FIT"].changed(compression=10.0))
     real, factor = np.asarray(sample.recordings[NAME].channels["force"].values)[:, 2], OFF
     for _ in range(TURNS):
         told = p.predict(constants(study, factor) | moved)[NAME]

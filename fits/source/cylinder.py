@@ -16,7 +16,7 @@ from tissuejax.tled import build, statics
 
 RADIUS, HEIGHT = 12.7e-3, 25.4e-3  # m; "2.54 mm" and "40 %" do not fit one height, and the force does not depend on it
 STRETCHES = np.linspace(1.0, 0.6, 21)[1:]  # twenty steps
-COUNTS = (4, 8)  # elements along a radius, and layers
+COUNTS = (3, 6)  # elements along a radius, and layers
 BULKS = (1e6, 1e7)  # Pa: the closed form is incompressible
 LAWS = ("ex-vivo-ogden", "in-vivo-1")
 

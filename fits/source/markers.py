@@ -51,22 +51,26 @@ def site(folder: Path, study: dict, name: str) -> dict:
     found = {}
     for law, values in (laws | {"gradients": kept["gradients"]["values"]}).items():
         told = p.predict(values)[name]
-        found[law] = errors(quiet.recordings[name], told, down) | {
-            "as recorded": errors(sample.recordings[name], told, down)
-        }
+        rest = np.asarray(told.channels["markers"].values)[0]  # estimated from noisy markers
+        off = rest - quiet.recordings[name].channels["markers"].values[0]
+        found[law] = errors(quiet.recordings[name], told, down, off)
+        found[law]["as recorded"] = errors(sample.recordings[name], told, down)
     return {"turns": len(turns) - 1, "laws": found, "displacement_mm": displacement(quiet.recordings[name], down)}
 
 
-def errors(measured: Recording, told: Recording, span: tuple[float, float]) -> dict:
-    """RMSE of the force, N, of each marker (eq. 2.2) and their mean (eq. 2.3), mm, as lengths of vectors."""
+def errors(measured: Recording, told: Recording, span: tuple[float, float], shift=0.0) -> dict:
+    """RMSE of the force, N, of each marker (eq. 2.2) and their mean (eq. 2.3), mm, as lengths of vectors.
 
-    def rms(channel: str) -> np.ndarray:
+    `shift`: of the prediction's resting markers, m: taken off, displacements are compared.
+    """
+
+    def rms(channel: str, off=0.0) -> np.ndarray:
         series = measured.channels[channel]
         within = (series.time >= span[0]) & (series.time <= span[1])
-        apart = np.asarray(told.channels[channel].values)[within] - np.asarray(series.values)[within]
+        apart = np.asarray(told.channels[channel].values)[within] - off - np.asarray(series.values)[within]
         return np.sqrt((apart**2).sum(-1).mean(0))
 
-    marker = 1e3 * rms("markers")
+    marker = 1e3 * rms("markers", shift)
     return {"force_N": float(rms("force")), "marker_mm": marker.tolist(), "mean_mm": float(marker.mean())}
 
 
