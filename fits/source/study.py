@@ -16,7 +16,7 @@ from tissuejax.storage import write_json, write_text
 jax.config.update("jax_enable_x64", True)
 
 COARSE, MIDDLE = (14, 12, 7), (20, 16, 9)
-SITE_MESHES = ((16, 16, 8), (20, 20, 10))
+SITE_MESHES = ((12, 12, 6), (16, 16, 8))
 SAGS = ((20, 16, 8), (24, 20, 10))
 AT_REST = 0.3  # hourglass stiffness for the weight alone, which strains little
 RADII = {"R 5 mm": 5e-3, "R 10 mm": 10e-3}
@@ -147,7 +147,9 @@ def draw_sites(kept: Kept) -> Figure:
     names = dict.fromkeys(name.split(", ")[1] for name in kept.parts if name.startswith("to 3 N"))
     for ax, name in zip(figure.subplots(1, 3, sharey=True), names, strict=True):
         for counts, line in zip(SITE_MESHES, ("--", "-"), strict=True):
-            part = kept.parts[f"to 3 N, {name}, {' x '.join(map(str, counts))}"]
+            part = kept.parts.get(f"to 3 N, {name}, {' x '.join(map(str, counts))}")
+            if part is None:
+                continue
             for key, label, color in (("force_N", "in vivo", "C0"), ("ex_vivo_N", "ex vivo", "C1")):
                 hexes = f"{label}, {part['hexes']} hexes"
                 ax.plot(part["depth_mm"][: len(part[key])], part[key], line, color=color, linewidth=1.2, label=hexes)
