@@ -116,24 +116,21 @@ def _turns(part: dict) -> str:
     return "; ".join(f"{names[k]} {_range(v['marker_mm'], v['mean_mm'])}" for k, v in laws.items())
 
 
-def _stops(parts: dict) -> str:
-    """Depth at which each site pushes back with 3 N, on both meshes."""
-    found = []
-    for name in ("site 1", "site 2", "site 3"):
-        ends = [p for key, p in parts.items() if key.startswith(f"to 3 N, {name}")]
-        depths = " and ".join(f"{p['end_depth_mm']:.1f}" for p in ends)
-        short = ", ".join(f"{p['end_force_N']:.2f} N" for p in ends if not p["reached"])
-        found.append(f"{name} at {depths} mm" + (f" (not reached: {short})" if short else ""))
-    return "; ".join(found) + f" ({' and '.join(str(p['hexes']) for p in ends)} hexes)"
-
-
-def _finest(parts: dict) -> dict[str, dict]:
-    """The press of each site on the finer mesh."""
+def _pressed(parts: dict) -> dict[str, dict]:
+    """The press of each site to 3 N."""
     return {key.split(", ")[1]: part for key, part in parts.items() if key.startswith("to 3 N")}
 
 
+def _stops(parts: dict) -> str:
+    """Depth at which each site pushes back with 3 N."""
+    return "; ".join(
+        f"{name} at {p['end_depth_mm']:.1f} mm" + ("" if p["reached"] else f" (not reached: {p['end_force_N']:.2f} N)")
+        for name, p in _pressed(parts).items()
+    )
+
+
 def _errors(parts: dict, depth: str, what: str, form: str) -> str:
-    return ", ".join(format(p[depth][what], form) for p in _finest(parts).values())
+    return ", ".join(format(p[depth][what], form) for p in _pressed(parts).values())
 
 
 def _first(parts: dict) -> str:
@@ -157,8 +154,11 @@ def _breath(part: dict) -> str:
 
 
 def _breath_how(part: dict) -> str:
-    fits = ", ".join(f"{part[k]['factor']:.3f} times the true moduli {k}" for k in ("with breathing", "without"))
-    return f"`breathing.py`: a support that lifts; fitted {fits}. In the source the plate stood still and the liver slid on it"
+    left = ", ".join(
+        f"{part[k]['force_rmse_N']:.4f} N and {part[k]['marker_mean_mm']:.2f} mm {k}"
+        for k in ("with breathing", "without")
+    )
+    return f"`breathing.py`: a support that lifts, where the source's liver moved against its plate; errors of the fits {left}"
 
 
 def _cylinder(parts: dict) -> str:
