@@ -58,11 +58,11 @@ def constants(study: dict, factor: float) -> dict[str, float]:
     return {f"energy.{k}": factor * v for k, v in published(LAW).constants.items()} | {"volumetric.K": study["K"]}
 
 
-def recorded(study: dict) -> tuple[Sample, Recording]:
-    """The recording with the sensors' noise, and without; the study's finer mesh."""
+def recorded(study: dict, span: float) -> tuple[Sample, Recording]:
+    """The recording of a lift over `span`, m, with the sensors' noise, and without; the study's finer mesh."""
     blank = rig(study)
     sample = Sample("lobe", {NAME: blank}, columns(study["lobe"](), (16, 14, 6)), 1060.0)
-    values = constants(study, 1.0) | motion(*(RANGE / 2 * np.array([np.cos(PHASE), np.sin(PHASE)])), FREQUENCY)
+    values = constants(study, 1.0) | motion(*(span / 2 * np.array([np.cos(PHASE), np.sin(PHASE)])), FREQUENCY)
     p = predictor(site_model(True), sample, settings=study["TRUTH"].changed(compression=8.0, processes=1))
     told = p.predict(values)[NAME]
     rng = np.random.default_rng([2012, 226])
@@ -110,8 +110,11 @@ def fitted(study: dict, sample: Sample, moved: dict[str, float]) -> dict:
 
 
 def breathing(study: dict) -> dict:
-    """What breathing of 4 mm does to force and markers without noise, what is read of it, and the two fits."""
-    sample, clean = recorded(study)
+    """What breathing of 4 mm does to force and markers without noise, what is read of it, and the fits.
+
+    `still` is a fit to a recording without breathing: what it is off by is the fit's coarser mesh.
+    """
+    sample, clean = recorded(study, RANGE)
     series, force = clean.channels["markers"], clean.channels["force"]
     height = 1e3 * np.asarray(series.values)[:, NEAREST, 2]
     held = series.time > series.time[-1] - 2 / FREQUENCY
@@ -126,6 +129,7 @@ def breathing(study: dict) -> dict:
         "read_frequency_1_s": frequency,
         "with breathing": fitted(study, sample, motion(sine, cosine, frequency)),
         "without": fitted(study, sample, {}),
+        "still": fitted(study, recorded(study, 0.0)[0], motion(0.0, 0.0, FREQUENCY)),
         "time_s": series.time.tolist(),
         "marker_height_mm": height.tolist(),
         "force_time_s": force.time[::4].tolist(),

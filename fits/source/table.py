@@ -154,11 +154,11 @@ def _breath(part: dict) -> str:
 
 
 def _breath_how(part: dict) -> str:
-    left = ", ".join(
-        f"{part[k]['force_rmse_N']:.4f} N and {part[k]['marker_mean_mm']:.2f} mm {k}"
-        for k in ("with breathing", "without")
+    fits = "; ".join(
+        f"{said} {part[k]['force_rmse_N']:.4f} N, {part[k]['marker_mean_mm']:.2f} mm, factor {part[k]['factor']:.3f}"
+        for k, said in (("with breathing", "with it"), ("without", "without"), ("still", "a still recording"))
     )
-    return f"`breathing.py`: a support that lifts, where the source's liver moved against its plate; errors of the fits {left}"
+    return f"`breathing.py`: a support that lifts, where the source's held marker kept still; errors and moduli of fits {fits}"
 
 
 def _cylinder(parts: dict) -> str:
