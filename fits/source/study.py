@@ -16,7 +16,7 @@ from tissuejax.storage import write_json, write_text
 jax.config.update("jax_enable_x64", True)
 
 COARSE, MIDDLE = (14, 12, 7), (20, 16, 9)
-SITE_MESHES = {"": (16, 16, 8), ", finer": (20, 20, 10)}
+SITE_MESH = (16, 16, 8)
 SAGS = ((20, 16, 8), (24, 20, 10))
 AT_REST = 0.3  # hourglass stiffness for the weight alone, which strains little
 RADII = {"R 5 mm": 5e-3, "R 10 mm": 10e-3}
@@ -76,8 +76,7 @@ def site_parts(folder: Path, kept: Kept) -> None:
         return runpy.run_path(str(folder.parent / "in-vivo-liver" / "study.py"))
 
     for name in deep["DEEPEST"]:
-        for mesh, counts in SITE_MESHES.items():
-            kept.get(f"to 3 N, {name}{mesh}", lambda name=name, counts=counts: deep["site"](study(), name, counts))
+        kept.get(f"to 3 N, {name}", lambda name=name: deep["site"](study(), name, SITE_MESH))
         kept.get(f"by marker, {name}", lambda name=name: markers["site"](folder, study(), name))
     kept.get("breathing", lambda: breathing["breathing"](study()))
 
@@ -142,13 +141,10 @@ def draw_cylinder(kept: Kept, cylinder: dict) -> Figure:
 def draw_sites(kept: Kept) -> Figure:
     """Force over depth until 3 N: the law in vivo that stands for the tissue, and the ex vivo law."""
     figure = Figure(figsize=(8.5, 3.2), layout="constrained")
-    laws = (("force_N", "in vivo", "C0"), ("ex_vivo_N", "ex vivo", "C1"))
-    for ax, name in zip(figure.subplots(1, 3, sharey=True), ("site 1", "site 2", "site 3"), strict=True):
-        for mesh, line in zip(SITE_MESHES, ("--", "-"), strict=True):
-            part = kept.parts[f"to 3 N, {name}{mesh}"]
-            for key, label, color in laws:
-                hexes = f"{label}, {part['hexes']} hexes"
-                ax.plot(part["depth_mm"][: len(part[key])], part[key], line, color=color, linewidth=1.2, label=hexes)
+    parts = {name.split(", ")[1]: part for name, part in kept.parts.items() if name.startswith("to 3 N")}
+    for ax, (name, part) in zip(figure.subplots(1, 3, sharey=True), parts.items(), strict=True):
+        for key, label, color in (("force_N", "law in vivo", "C0"), ("ex_vivo_N", "law ex vivo", "C1")):
+            ax.plot(part["depth_mm"][: len(part[key])], part[key], color=color, linewidth=1.2, label=label)
         ax.axhline(3.0, color="k", linewidth=0.8, linestyle=":")
         ax.set(title=name, xlabel="depth (mm)", ylim=(0, 4))
         ax.title.set_fontsize(9)
