@@ -1,6 +1,6 @@
 """Every quantitative result of the source's chapters 2 to 4 beside ours: what can be computed here is, in steps kept.
 
-tissuejax study fits/source          about seven minutes; parts that are in result.json are not run again
+tissuejax study fits/source          twenty minutes or so; parts that are in result.json are not run again
 """
 
 import json
@@ -16,10 +16,12 @@ from tissuejax.storage import write_json, write_text
 jax.config.update("jax_enable_x64", True)
 
 COARSE, MIDDLE = (14, 12, 7), (20, 16, 9)
+SITE_MESH = (16, 16, 8)
 SAGS = ((20, 16, 8), (24, 20, 10))
 AT_REST = 0.3  # hourglass stiffness for the weight alone, which strains little
 RADII = {"R 5 mm": 5e-3, "R 10 mm": 10e-3}
 PUBLISHED = {"a_N": 0.009991, "b_1_m": 373.6, "r_squared": 0.9998}  # eq. 4.14
+CYLINDER_ERROR = 3e-4  # N, 4.1.1.1
 
 
 class Kept:
@@ -58,6 +60,27 @@ def lobe_parts(lobe: dict, kept: Kept) -> None:
     kept.get("gravity reversed and applied again", lambda: lobe["reversed_gravity"](COARSE))
 
 
+def cylinder_parts(cylinder: dict, kept: Kept) -> None:
+    """The compressed cylinder of 4.1.1.1, each law with each bulk modulus."""
+    for law in cylinder["LAWS"]:
+        for bulk in cylinder["BULKS"]:
+            name = f"cylinder, {law}, K {1e-6 * bulk:g} MPa"
+            kept.get(name, lambda law=law, bulk=bulk: cylinder["compressed"](law, bulk))
+
+
+def site_parts(folder: Path, kept: Kept) -> None:
+    """The synthetic sites of fits/in-vivo-liver: pressed to 3 N, their errors by marker, and one that breathes."""
+    deep, markers, breathing = (runpy.run_path(str(folder / f"{n}.py")) for n in ("deep", "markers", "breathing"))
+
+    def study() -> dict:
+        return runpy.run_path(str(folder.parent / "in-vivo-liver" / "study.py"))
+
+    for name in deep["DEEPEST"]:
+        kept.get(f"to 3 N, {name}", lambda name=name: deep["site"](study(), name, SITE_MESH))
+        kept.get(f"by marker, {name}", lambda name=name: markers["site"](folder, study(), name))
+    kept.get("breathing", lambda: breathing["breathing"](study()))
+
+
 def sagging(lobe: dict, counts: tuple[int, int, int]) -> dict:
     """Sag under the weight alone."""
     geometry, u = lobe["settled"](counts, hourglass=AT_REST)
@@ -74,7 +97,7 @@ def settled_or_not(lobe: dict, form: str) -> dict:
         return {"no answer": str(error)}
 
 
-def draw(kept: Kept, lobe: dict) -> Figure:
+def draw_lobe(kept: Kept) -> Figure:
     """Force over depth of the pressed lobe, and eq. 4.14."""
     figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     axes = figure.subplots()
@@ -94,20 +117,80 @@ def draw(kept: Kept, lobe: dict) -> Figure:
     return figure
 
 
+def draw_cylinder(kept: Kept, cylinder: dict) -> Figure:
+    """Force over stretch beside eq. 4.11, and the distance between them beside the source's greatest."""
+    figure = Figure(figsize=(8.5, 3.6), layout="constrained")
+    force, error = figure.subplots(1, 2)
+    for i, law in enumerate(cylinder["LAWS"]):
+        for bulk, line in zip(cylinder["BULKS"], ("--", "-"), strict=True):
+            part = kept.parts[f"cylinder, {law}, K {1e-6 * bulk:g} MPa"]
+            apart = np.abs(np.subtract(part["force_N"], part["eq_4.11_N"]))
+            label = f"{law}, K {1e-6 * bulk:g} MPa"
+            error.semilogy(part["stretch"], apart, line, color=f"C{i}", label=label)
+        force.plot(part["stretch"], part["eq_4.11_N"], "k", linewidth=0.8, label="eq. 4.11" if i == 0 else None)
+        force.plot(part["stretch"], part["force_N"], "o", color=f"C{i}", markersize=3, label=label)
+    error.axhline(CYLINDER_ERROR, color="k", linewidth=0.8, linestyle=":", label="source's greatest")
+    for axes, what in ((force, "force (N)"), (error, "distance from eq. 4.11 (N)")):
+        axes.set(xlabel="stretch", ylabel=what)
+        axes.invert_xaxis()
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.legend(frameon=False, fontsize=7)
+    return figure
+
+
+def draw_sites(kept: Kept) -> Figure:
+    """Force over depth until 3 N: the law in vivo that stands for the tissue, and the ex vivo law."""
+    figure = Figure(figsize=(8.5, 3.2), layout="constrained")
+    parts = {name.split(", ")[1]: part for name, part in kept.parts.items() if name.startswith("to 3 N")}
+    for ax, (name, part) in zip(figure.subplots(1, 3, sharey=True), parts.items(), strict=True):
+        for key, label, color in (("force_N", "law in vivo", "C0"), ("ex_vivo_N", "law ex vivo", "C1")):
+            ax.plot(part["depth_mm"][: len(part[key])], part[key], color=color, linewidth=1.2, label=label)
+        ax.axhline(3.0, color="k", linewidth=0.8, linestyle=":")
+        ax.set(title=name, xlabel="depth (mm)", ylim=(0, 4))
+        ax.title.set_fontsize(9)
+        ax.spines[["top", "right"]].set_visible(False)
+    figure.axes[0].set_ylabel("force (N)")
+    figure.axes[0].legend(frameon=False, fontsize=7)
+    return figure
+
+
+def draw_breathing(part: dict) -> Figure:
+    """Height of a marker near the probe and force, over time."""
+    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
+    marker, force = figure.subplots(2, 1, sharex=True)
+    height = np.array(part["marker_height_mm"])
+    marker.plot(part["time_s"], height - height[0], "C0")
+    marker.set_ylabel("marker's height (mm)")
+    force.plot(part["force_time_s"], part["force_N"], "C1")
+    force.set(xlabel="time (s)", ylabel="force (N)")
+    for axes in (marker, force):
+        axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
 def main(folder: Path) -> str:
     """Run what is missing, write result.json, table.md and the figure; the answer in a sentence."""
-    kept, lobe = Kept(folder), runpy.run_path(str(folder / "lobe.py"))
-    table = runpy.run_path(str(folder / "table.py"))
+    kept = Kept(folder)
+    lobe, cylinder, table = (runpy.run_path(str(folder / f"{n}.py")) for n in ("lobe", "cylinder", "table"))
     for name, work in table["PARTS"].items():
         kept.get(name, lambda work=work: work(folder))
     lobe_parts(lobe, kept)
     for name, part in list(kept.parts.items()):
         if name.startswith("pressed"):
             kept.get(f"eq. 4.14, {name}", lambda part=part: lobe["exponential"](part["depth_mm"], part["force_N"]))
+    cylinder_parts(cylinder, kept)
+    site_parts(folder, kept)
     rows = table["rows"](kept.parts)
     write_text(folder / "table.md", table["text"](rows))
     (folder / "figures").mkdir(exist_ok=True)
-    draw(kept, lobe).savefig(folder / "figures" / "lobe.png", dpi=100)
+    pictures = {
+        "lobe": draw_lobe(kept),
+        "cylinder": draw_cylinder(kept, cylinder),
+        "sites": draw_sites(kept),
+        "breathing": draw_breathing(kept.parts["breathing"]),
+    }
+    for name, picture in pictures.items():
+        picture.savefig(folder / "figures" / f"{name}.png", dpi=100)
     beside = sum(row.ours != "" for row in rows)
     return f"{beside} of {len(rows)} results of the source stand beside ours; the others say why not"
 
