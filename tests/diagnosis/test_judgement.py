@@ -243,6 +243,18 @@ def test_the_evidence_along_a_smooth_part_is_exact():
             np.testing.assert_allclose(m.along(k, to - 1e-4), np.array(other) - m.value, atol=1e-5)
 
 
+@pytest.mark.parametrize("scale", [1.0, 1e3, 1e5])
+def test_a_part_does_nothing_where_the_parameters_do_all_that_it_does(scale):
+    """What lies in the parameters' span changes no density, however large: rounding was up to a thousand nats here."""
+    x = np.linspace(0, 1, 60)
+    slopes = 1e3 * np.stack([x, x**2, x**3], 1)
+    residual = 1e4 * np.random.default_rng(1).standard_normal(60) * x
+    linear = Linear(residual, scale * slopes, np.zeros(3), np.zeros(3))
+    parts = (Part("law", "law", slopes[:, :2]), Part("white", "white", within=(np.eye(60),)))
+    m = marginal(linear, parts, np.zeros(2), Blocked((slice(0, 60),), np.full(60, 1e-3)))
+    np.testing.assert_allclose(m.along(0, np.geomspace(1e-8, 10, 20)), 0.0, atol=1e-6)
+
+
 def test_the_prior_of_an_amplitude_is_two_half_normals():
     priors = Widths(np.array([0.01, 0.02]), np.array([0.0, 0.1]), 10.0)
     a = np.array([0.015, 0.07])

@@ -26,6 +26,7 @@ from scipy.optimize import lsq_linear
 
 from tissuejax.estimation.discrepancy import Part
 
+ROUNDING = 1e-10  # of what a part says before parameters and other parts are taken out: less is rounding
 JITTER = (1e-12, 1e-10, 1e-8)  # on the diagonal of a matrix of correlations: the least that factors
 
 
@@ -77,12 +78,14 @@ class Marginal:
     def along(self, k: int, d: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
         """What the log evidence changes by where the squared amplitude of a smooth part k does by d, the others kept.
 
-        Exact: with A = F'PF and b = F'P r of the part's factor F, -1/2 log|I + d A| + d/2 b'(I + d A)^-1 b.
+        Exact: with A = F'PF and b = F'P r of the part's factor F, -1/2 log|I + d A| + d/2 b'(I + d A)^-1 b. Where the
+        parameters do all that a direction of F does, A and b are rounding there, and it changes nothing.
         """
-        inner, b = self._all[2][k]
+        inner, b, whole = self._all[2][k]
         size, turn = np.linalg.eigh(inner)
-        grown = np.maximum(1 + np.outer(d, np.maximum(size, 0.0)), 1e-12)
-        return -0.5 * np.sum(np.log(grown), axis=1) + 0.5 * d * np.sum((turn.T @ b) ** 2 / grown, axis=1)
+        told = size > ROUNDING * whole
+        grown = np.maximum(1 + np.outer(d, size[told]), 1e-12)
+        return -0.5 * np.sum(np.log(grown), axis=1) + 0.5 * d * np.sum((turn.T @ b)[told] ** 2 / grown, axis=1)
 
 
 @dataclass(frozen=True)
@@ -185,9 +188,9 @@ def _derivatives(
     g: Float[np.ndarray, "N w"],
     half: Float[np.ndarray, "N w"],
     left: Float[np.ndarray, " N"],
-) -> tuple[Float[np.ndarray, " K"], Float[np.ndarray, "K K"], dict[int, tuple[np.ndarray, np.ndarray]]]:
+) -> tuple[Float[np.ndarray, " K"], Float[np.ndarray, "K K"], dict[int, tuple[np.ndarray, np.ndarray, float]]]:
     """Slope 1/2 (z'B z - tr P B), z = K^-1 r, and Fisher information 1/2 tr(P B_a P B_b), with P = D^-1 - half g'; of
-    each smooth part, F'PF and F'z."""
+    each smooth part, F'PF, F'z and the trace of F'D^-1F."""
     soft = [k for k, part in enumerate(parts) if part.factor is not None]
     hard = [k for k, part in enumerate(parts) if part.factor is None]
     slope, fisher = np.zeros(len(parts)), np.zeros((len(parts), len(parts)))
@@ -197,7 +200,11 @@ def _derivatives(
     moved = light - half @ (g.T @ u)  # P U
     inner, pull = u.T @ moved, u.T @ left
     ends = [*edges, u.shape[1]]
-    own = {k: (inner[a:b, a:b], pull[a:b]) for k, a, b in zip(soft, ends, ends[1:], strict=False)}
+    whole = np.sum(light * u, axis=0)
+    own = {
+        k: (inner[a:b, a:b], pull[a:b], float(np.sum(whole[a:b])))
+        for k, a, b in zip(soft, ends, ends[1:], strict=False)
+    }
     if soft:
         trace = np.add.reduceat(np.sum(moved * u, axis=0), edges)
         slope[soft] = np.add.reduceat(pull**2, edges) - trace
