@@ -163,8 +163,7 @@ def offered(
     recording's own (specimens that differ, or a gain that changed: stress and stretch can't tell), a
     rate-independent hysteresis, and a strain energy of a form that no term of the catalogue has: what is smooth in
     stretch, and the same for all recordings of one kind, needs no process to explain it. Where no strain was passed
-    twice, a law of each recording's own is one that fails to carry from one strain to another, and where nothing is
-    unloaded a hysteresis is a law: that form too.
+    twice, a law of each recording's own is one that fails to carry from one strain to another: that form too.
 
     Args:
         names: effects asked for; all by default.
@@ -180,9 +179,8 @@ def offered(
     if not protocol.rates:
         kept = without_pace(kept)
     if LAW.key in kept:
-        blind = [own for own in (SCATTER, HYSTERESIS) if not getattr(protocol, needs()[own.name])]
-        more = {family: LAW.widens["law"] for own in blind for family in own.widens}
-        kept[LAW.key] = replace(LAW, widens={**LAW.widens, **more})
+        own = {} if protocol.repeated else dict.fromkeys(SCATTER.widens, LAW.widens["law"])
+        kept[LAW.key] = replace(LAW, widens={**LAW.widens, **own})
     for name, need in sorted(needs().items()):
         if any(c.name == name for c in kept.values()) and not getattr(protocol, need):
             kept = {k: c for k, c in kept.items() if c.name != name}

@@ -10,6 +10,7 @@ the model of Kennedy and O'Hagan (2001), with the parts that rests of material t
 | gain | constant times the stress, of each recording's own (specimens differ in stiffness, load cells in gain) |
 | own law | squared exponential in strain (0.5) times the stress, of a recording's own where several share a law |
 | hysteresis | squared exponential in strain (0.4) times a loading state, in three shapes, shared by a mode |
+| added law | what hysteresis is where nothing turns round: smooth in strain times the peak |
 | slow | exponential in time (0.05, 0.25 and 1.5 of the recording), of each recording's own |
 | waning gain | the stress times exponential in time (0.5 of the recording): stiffness that comes and goes, or is lost |
 | white | what scatters from sample to sample beyond the stated noise |
@@ -69,7 +70,7 @@ class Part:
 
     Attributes:
         name: e.g. "gain", "hysteresis, wide".
-        family: "law", "gain", "hysteresis", "slow", "white" or "sudden".
+        family: "law", "gain", "hysteresis", "added law", "slow", "white", "effect" or "sudden".
         factor: B = factor factor' (smooth parts have few columns), or None.
         within: B is block-diagonal, a block for each series; or None.
     """
@@ -101,6 +102,11 @@ def loading_states(strain: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
         out[i] = h
     last = np.maximum.accumulate(np.where(step != 0, np.arange(len(step)), -1))
     return np.where(last[:, None] >= 0, out[np.maximum(last, 0)], 0.0)
+
+
+def turned(states: Float[np.ndarray, "n 3"]) -> bool:
+    """Whether a series turned round: its narrowest state has come to either side."""
+    return bool(np.min(states[:, 0]) < 0 < np.max(states[:, 0]))
 
 
 def smooth_factor(x: Float[np.ndarray, "n k"], length: float) -> Float[np.ndarray, "n r"]:
@@ -135,7 +141,7 @@ class Discrepancy:
         belongs: a column for every recording, one where a row belongs to it.
         own: factors of a law of each recording's own, about a stress of one; its series of a mode share it. None of a
             recording that is alone in its mode: the law of that mode is its own.
-        turning: factors of hysteresis about a peak of one, by name.
+        turning: factors of hysteresis about a peak of one, by name; of a law that is added where nothing turns round.
         fixed: the parts that don't depend on the prediction.
         fading: of a gain that changes in time, by series, how alike two samples are; none where time says nothing.
         nearly: factors of what the law of an effect errs by, about a change of the stress of one: smooth in strain,
@@ -166,7 +172,7 @@ class Discrepancy:
         laws = tuple(Part(name, "law", stress * factor) for name, factor in self.laws)
         several = (Part("gain", "gain", stress * self.belongs), Part("own law", "gain", stress * self.own))
         peak = self.belongs @ np.max(np.abs(stress) * self.belongs, axis=0)
-        turning = (Part(name, "hysteresis", peak[:, None] * factor) for name, factor in self.turning)
+        turning = (Part(name, name.split(",")[0], peak[:, None] * factor) for name, factor in self.turning)
         edges = np.cumsum([0, *(len(alike) for alike in self.fading)])
         waning = tuple(
             alike * np.outer(prediction[a:b], prediction[a:b])
@@ -216,7 +222,8 @@ def discrepancy(
     belongs = np.array([recordings.index(s.recording) for s in series])[of]
     modes = [s.mode for s in series]
     near, out = shared(ALIKE, modes), []
-    turning = tuple((f"hysteresis, {shape}", near * states[:, i, None]) for i, shape in enumerate(STATES))
+    kind = "hysteresis" if any(turned(s.states) for s in series) else "added law"
+    turning = tuple((f"{kind}, {shape}", near * states[:, i, None]) for i, shape in enumerate(STATES))
     shares = [s.time / (float(np.ptp(s.time)) or 1.0) for s in series]
     apart = [np.abs(elapsed[:, None] - elapsed) for elapsed in shares]  # of the recording's duration
     for name, time in SLOW.items():

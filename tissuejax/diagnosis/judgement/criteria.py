@@ -27,15 +27,16 @@ class Criteria:
         counted: block means that count at most: those of a material test. More are more channels of one motion.
         shares: standard deviation of the half-normal prior of a discrepancy's amplitude, a share of the stress, by
             family. Ground: what the best published laws leave of careful recordings, 1 to 4 % of the peak in all; of a
-            surface that is met early or late, of the depth of a press; of a blade's entry, the peak that its shoulder
-            ends (5 % in opened cases of an elastic foundation); of a marker, of what it moved (it is not quite where it
-            was registered); of the law of a tissue's effect, of what that effect does and the base could not (two
-            exponentials and a constant leave 3, 7 and 10 % of a relaxation by a power of time over two, three and four
-            decades; half of it loses on `fits/real-panel`); of the numerical error, in units of what mesh and speed
-            leave open by Richardson's extrapolation.
+            surface that is met early or late, of the depth of a press, of a
+            blade's entry, the peak that its shoulder ends (5 % in opened cases of an elastic foundation); of a marker,
+            of what it moved (it is not quite where it was registered); of the law of a tissue's effect, of what that
+            effect does and the base could not (two exponentials and a constant leave 3, 7 and 10 % of a relaxation by a
+            power of time over two, three and four decades; half of it loses on `fits/real-panel`); of the numerical
+            error, in units of what mesh and speed leave open by Richardson's extrapolation.
         strange: by which factor such a part is wider. Ground: 10 makes of 1 to 2 % the 10 to
             20 % by which effects of the catalogue change a recording.
-        settled: families that are never wider: what they are is known.
+        settled: families that are never wider: what they are is known, or (an added law) nothing but what another part
+            is already: a law beside the base is a share of the stress.
         sudden: standard deviation of the half-normal prior of what happens at once, where something does: share of the
             stress. Ground: a slip or a step worth a word is some per cent to a third of what is measured. Elsewhere it
             is `shares["sudden"]`: as good as nothing.
@@ -63,12 +64,12 @@ class Criteria:
     counted: int = 400
     shares: Mapping[str, float] = field(
         default_factory=lambda: (
-            {"law": 0.015, "gain": 0.015, "hysteresis": 0.01, "slow": 0.01, "white": 0.005, "effect": 0.1}
-            | {"marker": 0.02, "onset": 0.01, "peak": 0.05, "numerical": 1.0, "sudden": 1e-4}
+            {"law": 0.015, "gain": 0.015, "hysteresis": 0.01, "added law": 0.01, "slow": 0.01, "white": 0.005}
+            | {"effect": 0.1, "marker": 0.02, "onset": 0.01, "peak": 0.05, "numerical": 1.0, "sudden": 1e-4}
         )
     )
     strange: float = 10.0
-    settled: frozenset[str] = frozenset({"peak", "effect"})
+    settled: frozenset[str] = frozenset({"peak", "effect", "added law"})
     sudden: float = 0.1
     change: float = 0.3
     rig: float = 0.1
