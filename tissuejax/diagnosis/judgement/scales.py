@@ -17,7 +17,7 @@ from tissuejax.diagnosis.judgement.marginal import Blocked, Widths
 from tissuejax.estimation.discrepancy import Discrepancy, Done, Part
 
 CLOCKED = ("s", "1/s")  # units of parameters by which a law knows time
-ALIKE = 1e-6  # of the largest: a direction in which constants of the base do less than that is none of its own
+SINGULAR = 1e-6  # of the largest: a direction in which constants of the base do less than that is none of its own
 
 
 @dataclass
@@ -97,7 +97,7 @@ class Scales:
         if not felt.any():
             return np.zeros((len(slopes), 0))
         turned, size, _ = np.linalg.svd(slopes[:, felt] / sizes[felt], full_matrices=False)
-        return turned[:, size > ALIKE * size[0]]
+        return turned[:, size > SINGULAR * size[0]]
 
     def _known(self, name: str, error: Float[np.ndarray, "M ..."]) -> Part:
         """A known error of a simulation: by columns, or where its sign is not known of each block alone."""
