@@ -27,12 +27,12 @@ class Criteria:
         counted: block means that count at most: those of a material test. More are more channels of one motion.
         shares: standard deviation of the half-normal prior of a discrepancy's amplitude, a share of the stress, by
             family. Ground: what the best published laws leave of careful recordings, 1 to 4 % of the peak in all; of a
-            surface that is met early or late, of the depth of a press, of a blade's entry, the peak that its shoulder
+            surface that is met early or late, of the depth of a press; of a blade's entry, the peak that its shoulder
             ends (5 % in opened cases of an elastic foundation); of a marker, of what it moved (it is not quite where it
             was registered); of the law of a tissue's effect, of what that effect does and the base could not (two
             exponentials and a constant leave 3, 7 and 10 % of a relaxation by a power of time over two, three and four
-            decades; 10.5 % over the right answers of `fits/real-panel`); of the numerical error, in units of what mesh
-            and speed leave open by Richardson's extrapolation.
+            decades; with it the right answers of `fits/real-panel` err by 10.5 %, which is no independent ground); of
+            the numerical error, in units of what mesh and speed leave open by Richardson's extrapolation.
         strange: by which factor such a part is wider. Ground: 10 makes of 1 to 2 % the 10 to
             20 % by which effects of the catalogue change a recording.
         settled: families that are never wider: what they are is known, or (an added law) nothing but what another part
