@@ -141,7 +141,7 @@ class Discrepancy:
         belongs: a column for every recording, one where a row belongs to it.
         own: factors of a law of each recording's own, about a stress of one; its series of a mode share it. None of a
             recording that is alone in its mode: the law of that mode is its own.
-        turning: factors of hysteresis about a peak of one, by name; of a law that is added where nothing turns round.
+        turning: hysteresis about a peak of one, or a law that is added where nothing turns round.
         fixed: the parts that don't depend on the prediction.
         fading: of a gain that changes in time, by series, how alike two samples are; none where time says nothing.
         nearly: factors of what the law of an effect errs by, about a change of the stress of one: smooth in strain,
@@ -154,7 +154,7 @@ class Discrepancy:
     laws: tuple[tuple[str, Float[np.ndarray, "N r"]], ...]
     belongs: Float[np.ndarray, "N R"]
     own: Float[np.ndarray, "N q"]
-    turning: tuple[tuple[str, Float[np.ndarray, "N r"]], ...]
+    turning: tuple[Part, ...]
     fixed: tuple[Part, ...]
     fading: tuple[Float[np.ndarray, "n n"], ...]
     nearly: Float[np.ndarray, "N e"]
@@ -172,7 +172,7 @@ class Discrepancy:
         laws = tuple(Part(name, "law", stress * factor) for name, factor in self.laws)
         several = (Part("gain", "gain", stress * self.belongs), Part("own law", "gain", stress * self.own))
         peak = self.belongs @ np.max(np.abs(stress) * self.belongs, axis=0)
-        turning = (Part(name, name.split(",")[0], peak[:, None] * factor) for name, factor in self.turning)
+        turning = (Part(p.name, p.family, peak[:, None] * p.factor) for p in self.turning)
         edges = np.cumsum([0, *(len(alike) for alike in self.fading)])
         waning = tuple(
             alike * np.outer(prediction[a:b], prediction[a:b])
@@ -223,7 +223,7 @@ def discrepancy(
     modes = [s.mode for s in series]
     near, out = shared(ALIKE, modes), []
     kind = "hysteresis" if any(turned(s.states) for s in series) else "added law"
-    turning = tuple((f"{kind}, {shape}", near * states[:, i, None]) for i, shape in enumerate(STATES))
+    turning = tuple(Part(f"{kind}, {shape}", kind, near * states[:, i, None]) for i, shape in enumerate(STATES))
     shares = [s.time / (float(np.ptp(s.time)) or 1.0) for s in series]
     apart = [np.abs(elapsed[:, None] - elapsed) for elapsed in shares]  # of the recording's duration
     for name, time in SLOW.items():
