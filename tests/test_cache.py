@@ -56,6 +56,33 @@ def test_found_without_tracing_to_the_last_bit(kept_in):
     assert np.allclose(value, np.sin(2 * A) + 0.25, atol=1e-15)
 
 
+def test_what_is_compiled_ahead_is_traced_once_and_is_what_is_called(kept_in):
+    counted, other = Counted(), Counted()
+    program, never = Kept(counted, "ahead"), Kept(other, "never called")
+    with programs.ahead([(program, (A, B)), (never, (A[:3], {"b": A[:3]}))]):
+        value = np.asarray(program(A, B))
+    assert counted.traced == 1
+    assert np.allclose(value, np.sin(2 * A) + 0.25, atol=1e-15)
+    assert np.allclose(np.asarray(never(A[:3], {"b": A[:3]})), np.sin(2 * A[:3]) + A[:3], atol=1e-15)
+    assert other.traced == 1  # whether it was begun ahead or not
+
+
+def test_what_fails_ahead_fails_where_it_is_called_and_may_succeed_later(kept_in):
+    broken = [True]
+
+    def fails(a):
+        if broken:
+            raise ZeroDivisionError("no such law")
+        return 2 * a
+
+    program = Kept(fails, None)
+    with programs.ahead([(program, (A,))]):
+        with pytest.raises(ZeroDivisionError, match="no such law"):
+            program(A)
+        broken.clear()
+        assert np.array_equal(np.asarray(program(A)), 2 * A)
+
+
 def test_another_text_or_shape_is_another_program(kept_in):
     Kept(Counted(), "twice")(A, B)
     other, longer = Counted(3.0), Counted()

@@ -7,9 +7,12 @@ import gc
 import hashlib
 import os
 import stat
+import threading
 import warnings
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -105,7 +108,8 @@ class Kept:
                 can't be told: then it is traced in every process.
         """
         self._function, self._said = function, said
-        self._known: dict[Any, Callable] = {}
+        self._known: dict[Any, Future[Callable]] = {}
+        self._asking = threading.Lock()
         _all.add(self)
 
     def forget(self) -> None:
@@ -115,10 +119,27 @@ class Kept:
     def __call__(self, *arguments: Any) -> Any:
         """The function's value."""
         leaves, tree = jax.tree.flatten(arguments)
+        return self._program(tree, leaves)(*leaves)
+
+    def prepare(self, *arguments: Any) -> None:
+        """Compile for arguments of these shapes; who calls meanwhile waits for it."""
+        leaves, tree = jax.tree.flatten(arguments)
+        self._program(tree, leaves)
+
+    def _program(self, tree: Any, leaves: list) -> Callable:
         key = (tree, tuple((np.shape(x), np.result_type(x).str) for x in leaves))
-        if key not in self._known:
-            self._known[key] = jax.jit(self._traced(key, leaves)).lower(*leaves).compile()
-        return self._known[key](*leaves)
+        with self._asking:
+            promised = self._known.get(key)
+            mine = promised is None
+            if mine:
+                promised = self._known[key] = Future()
+        if mine:
+            try:
+                promised.set_result(jax.jit(self._traced(key, leaves)).lower(*leaves).compile())
+            except BaseException as error:
+                self._known.pop(key, None)
+                promised.set_exception(error)
+        return promised.result()
 
     def _traced(self, key: tuple, leaves: list) -> Callable:
         def flat(*leaves):
@@ -142,6 +163,23 @@ class Kept:
             return None
         name = key_of(self._said, key)
         return None if name is None else Path(where) / TRACED / f"{name}.bin"
+
+
+@contextmanager
+def ahead(calls: Iterable[tuple[Kept, tuple]]) -> Iterator[None]:
+    """While the block runs, compile what these calls will need, in this order, on all cores that this process may use.
+
+    The compiler runs beside Python. What has not been begun when the block ends is not compiled; what fails, fails
+    where it is called.
+    """
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    pool = ThreadPoolExecutor(cores, thread_name_prefix="ahead")
+    try:
+        for kept, arguments in calls:
+            pool.submit(kept.prepare, *arguments)
+        yield
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _read(path: Path) -> export.Exported | None:

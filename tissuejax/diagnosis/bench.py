@@ -7,6 +7,7 @@ parameter paths that are neutral until freed. Material tests and probings are tw
 
 import abc
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -136,6 +137,10 @@ class Bench(abc.ABC):
         return candidate.grid
 
     costly: ClassVar[bool] = False  # whether a prediction costs so much that one is saved where nothing hangs on it
+
+    def ahead(self) -> AbstractContextManager[None]:
+        """While it is entered, whatever a search will need is made ready beside it; nothing by default."""
+        return nullcontext()
 
     def anchored(self, values: Mapping[str, float]) -> "Bench":
         """The bench with predictions exact at `values`: itself, unless it corrects a cheaper simulation there."""

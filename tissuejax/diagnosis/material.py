@@ -11,7 +11,8 @@ where the linearised program takes three times as long to compile as the predict
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -19,7 +20,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from tissuejax.cache.key import described
-from tissuejax.cache.programs import Kept
+from tissuejax.cache.programs import Kept, ahead
 from tissuejax.diagnosis.bench import Bench, Candidate, Free
 from tissuejax.diagnosis.catalogue import Entry, entries
 from tissuejax.diagnosis.judgement.blocks import State, strain
@@ -50,13 +51,13 @@ class Program:
         price: what a prediction costs beside that of the base model.
     """
 
-    run: Callable[[Float[Array, " p"], MaterialTest], Float[Array, "n ..."]]
+    run: Kept
     places: Mapping[str, tuple[np.ndarray, tuple[dict[str, int], ...]]]
     price: float
 
 
 @lru_cache(maxsize=64)
-def compiled(model: Model) -> Callable[[Float[Array, " p"], MaterialTest], Float[Array, "n ..."]]:
+def compiled(model: Model) -> Kept:
     """One program a model, shared by all benches: hashing it at every call took a tenth of a diagnosis."""
 
     def predicted(theta: Float[Array, " p"], test: MaterialTest) -> Float[Array, "n ..."]:
@@ -65,17 +66,25 @@ def compiled(model: Model) -> Callable[[Float[Array, " p"], MaterialTest], Float
     return Kept(predicted, described(model))
 
 
-def lengthened(test: MaterialTest) -> MaterialTest:
-    """`test` with its last sample repeated up to 128, 192, 256, 384, ... samples: few lengths, few compilations."""
-    power = max(SHORTEST, 2 ** math.ceil(math.log2(len(test.time))))
-    between = 3 * power // 4
-    extra = (between if power > SHORTEST and len(test.time) <= between else power) - len(test.time)
+def lengthened(test: MaterialTest, n: int) -> MaterialTest:
+    """`test` with its last sample repeated up to `n` samples."""
 
     def longer(series: np.ndarray) -> np.ndarray:
-        return np.concatenate([series, np.repeat(series[-1:], extra, axis=0)])
+        return np.concatenate([series, np.repeat(series[-1:], n - len(series), axis=0)])
 
     arrays = {name: getattr(test, name) for name in test.__dataclass_fields__}
     return MaterialTest(**{**arrays, "time": longer(test.time), "drive": longer(test.drive)})
+
+
+def lengths(samples: Sequence[int]) -> list[int]:
+    """To how many samples recordings of a sample are lengthened: few lengths, few compilations.
+
+    The longest to the next of 128, 192, 256, 384, 512, ..., the others to that or a half, a quarter, ... of it.
+    """
+    power = max(SHORTEST, 2 ** math.ceil(math.log2(max(samples))))
+    top = 3 * power // 4 if power > SHORTEST and max(samples) <= 3 * power // 4 else power
+    steps = [top >> k for k in range(top.bit_length()) if k == 0 or (top >> k) >= SHORTEST]
+    return [min(step for step in steps if step >= n) for n in samples]
 
 
 class MaterialBench(Bench):
@@ -100,9 +109,9 @@ class MaterialBench(Bench):
             sizes: of the recordings; worked out by default.
         """
         recordings = (*fitted, *held_out)
-        tests = {
-            n: lengthened(experiment(sample.recordings[n].experiment).test(sample.recordings[n])) for n in recordings
-        }
+        tests = {n: experiment(sample.recordings[n].experiment).test(sample.recordings[n]) for n in recordings}
+        to = lengths([len(t.time) for t in tests.values()])
+        tests = {n: lengthened(t, k) for (n, t), k in zip(tests.items(), to, strict=True)}
         first = min(float(t.start) for t in tests.values())  # the clock's zero means nothing, only what has passed
         tests = {n: replace(t, start=t.start - first) for n, t in tests.items()}
         measured = Series.of(sample, dict.fromkeys(recordings, (STRESS_CHANNEL,)), lost=True)
@@ -212,6 +221,15 @@ class MaterialBench(Bench):
             places = {n: self._places(model, n) for n in self._tests}
             self._built[key] = Program(compiled(model), places, self._price(model))
         return self._built[key]
+
+    def ahead(self) -> AbstractContextManager[None]:
+        """See `Bench.ahead`: the programs of the base and of every candidate by itself, for each length of a series."""
+        programs = {}
+        for values in (self.base, *(c.paths for c in self.candidates.values())):
+            program = self._program(dict.fromkeys((*self.known, *values), 0.0))
+            programs[program] = None
+        tests = {(t.mode, np.shape(t.drive)): n for n, t in self._tests.items() if n in self.fitted}
+        return ahead((p.run, (p.places[n][0], self._tests[n])) for p in programs for n in tests.values())
 
     def _places(self, model: Model, name: str) -> tuple[np.ndarray, tuple[dict[str, int], ...]]:
         """Neutral theta, and where values go in it: the recording's own, which count more, after the common ones."""

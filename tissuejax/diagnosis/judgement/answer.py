@@ -181,7 +181,8 @@ def answer(
         cut, of: block means of both, and the discrepancy that any model leaves of them.
         kept: where sets are kept for a diagnosis that is begun again.
     """
-    found = explore(whole, cut, of, criteria, effort, report, kept)
+    with whole.ahead():
+        found = explore(whole, cut, of, criteria, effort, report, kept)
     evidence = found.evidence(bench.fitted, bench.held_out)
     judgement = judge(evidence, criteria)
     shown = copy.copy(bench)
