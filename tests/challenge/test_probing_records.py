@@ -7,7 +7,7 @@ from tissuejax.challenge import probing_cases
 from tissuejax.challenge.lobe import Lobe
 from tissuejax.challenge.material import Ingredient
 from tissuejax.challenge.probe_paths import Path, over
-from tissuejax.challenge.probing_bench import record
+from tissuejax.challenge.probing_bench import Record, record
 from tissuejax.challenge.probing_menu import CATALOGUED, LOUD
 from tissuejax.challenge.solid import Tissue
 
@@ -48,6 +48,24 @@ def test_sensors_and_rig_share_one_solution(told):
     felt = np.interp(plain.time[deepest], time, plain.force[:, 2])
     assert plain.probe[deepest, 2] - soft.probe[deepest, 2] == pytest.approx(2e-3 * felt, rel=0.02)
     assert len(solved) == 1
+
+
+@pytest.mark.parametrize("power", [1, 2])
+def test_a_rig_that_gives_is_as_large_as_it_bends_the_force_along_the_path_recorded(power):
+    """Force A d^n and a probe recorded c A d^n too deep: A (d + c A d^n)^n is what the bare body would have felt there,
+    which is a factor for n = 1 and no effect at all."""
+    A, c, t = 200.0**power / 4, 2e-3, np.linspace(0.0, 1.0, 201)
+    deep = 5e-3 * np.sin(np.pi * t)
+
+    def pressed(below: np.ndarray) -> Record:
+        force = np.stack([0 * t, 0 * t, A * deep**power], 1)
+        return Record("r", 0.0, RADIUS, t, np.stack([0 * t, 0 * t, -below], 1), t, force, t, np.zeros((201, 1, 3)))
+
+    there, felt = A * (deep + c * A * deep**power) ** power, A * deep**power
+    left = felt - there * (there @ felt) / (there @ there)
+    size = probing_cases.beyond([pressed(deep)], [pressed(deep + c * felt)], (1e-3, 1e-4))
+    assert size == pytest.approx(np.sqrt(np.mean(left**2) / 3) / 1e-3, rel=0.05, abs=0.01)
+    assert (size > 0.5) == (power == 2)
 
 
 def test_the_body_is_solved_for_again_where_it_feels_the_effect(told):
