@@ -13,9 +13,10 @@ from tissuejax.challenge.quasistatic import Bed, Bench
 from tissuejax.challenge.solid import Solid, Tissue
 from tissuejax.challenge.touch import Membrane, Sphere
 
-# Hexes along each direction, and their spacing under a large and a small probe over that far away. Of a case's forces
-# this leaves an error of 1 % (2 % where shallow), of its markers 4 um (`fits/challenge/mesh.py`); 16 x 16 x 6 graded to
-# a seventh, with which the sets up to probing-fourth were made, left 3 to 6 % and up to 100 um, in hexes 13 mm wide.
+# Hexes along each direction, and their spacing under a large and a small probe over that far away. Of a press this
+# leaves an error of 0.4 % of the force (1 % where shallow) and 4 um of the markers (`fits/challenge/mesh.py`). 16 x 16
+# x 6 graded to a seventh, with which the sets up to probing-fourth were made, left 2 %, and of one marker a fifth of
+# what it moves.
 MESH = (24, 24, 8)
 FINE, FINER, SMALL = 0.25, 0.18, 0.007
 REACH = 0.3
