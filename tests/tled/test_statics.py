@@ -121,9 +121,14 @@ def test_a_load_is_led_in_steps_that_find_their_equilibrium(monkeypatch, longest
         return
     assert float(statics.gradual(scene, 1.0).displacement.max()) == last
     reached = [0.0]
-    for begun, when in tried:
+    for (begun, when), (_, then) in zip(tried, tried[1:] + [(1.0, 1.0)], strict=True):
         assert begun == reached[-1]
-        reached += [when] if when <= begun + longest else []
+        step = when - begun
+        if step > longest:
+            assert then == begun + step / 2
+        else:
+            assert then == min(1.0, when + 2 * step)
+            reached.append(when)
     assert reached[-1] == 1.0
     assert np.diff(reached[:-1]).min() > longest / 2  # longer steps are tried again
 
