@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.optimize import minimize_scalar
 
 from tests.tled import cases
@@ -11,7 +12,7 @@ from tissuejax.energies.reduced_polynomial import ReducedPolynomial
 from tissuejax.energies.volumetric import Quadratic
 from tissuejax.mesh.columns import box
 from tissuejax.recordings.recording import Geometry
-from tissuejax.tled import build, capsule, contact, statics, support
+from tissuejax.tled import build, capsule, contact, native, statics, support
 from tissuejax.tled.history import Prony
 from tissuejax.tled.shapes import Platen
 from tissuejax.tled.simulate import run
@@ -96,18 +97,43 @@ def test_a_sticky_platen_pulls_with_its_strength_and_lets_go():
     assert bare.max() < 0.02 * pull.max()
 
 
-def test_a_capsule_carries_the_tension_of_a_stretched_membrane():
-    """Plane-stress neo-Hookean: c (l1 - l1^-3 l2^-2) per width along 1, on the four faces that a cut across x meets."""
+@pytest.mark.parametrize("kind", ["hexes", "tets"])
+def test_a_capsule_carries_the_tension_of_a_stretched_membrane(kind):
+    """Plane-stress neo-Hookean: c (l1 - l1^-3 l2^-2) per width along 1, on the four faces that a cut across x meets;
+    energy c/2 (l1^2 + l2^2 + (l1 l2)^-2 - 3) per area, on all six."""
     g = box(SIZE, (4, 3, 2))
+    g = cases.tets(g) if kind == "tets" else g
     scene = cases.plain(g, np.arange(2.0))
     l1, l2, l3 = 1.2, 0.9, 1.1
     u = (jnp.asarray(g.points) * jnp.array([l1 - 1, l2 - 1, l3 - 1])).T
     c = 0.7
-    f = np.asarray(jax.jit(lambda u: capsule.forces(capsule.skin(scene.body), c, u))(u))
+    skin = capsule.skin(scene.body)
+    f = np.asarray(jax.jit(lambda u: capsule.forces(skin, c, u))(u))
     cut = np.asarray(g.points)[:, 0] > SIZE[0] / 2 - 1e-9
     along = 2 * SIZE[1] * c * (l1 - l1**-3 * l2**-2) + 2 * SIZE[2] * c * (l1 - l1**-3 * l3**-2)
     assert f[0, cut].sum() == pytest.approx(along, rel=1e-9)
     assert np.abs(f.sum(1)).max() < 1e-12
+    kept = [(SIZE[i] * SIZE[j], a * a + b * b + (a * b) ** -2 - 3) for i, j, a, b in
+            ((0, 1, l1, l2), (0, 2, l1, l3), (1, 2, l2, l3))]  # fmt: skip
+    told = jax.jit(lambda u: capsule.energy(skin, c, u[:, skin.nodes]))(u)
+    assert float(told) == pytest.approx(c * sum(area * w for area, w in kept), rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["hexes", "tets"])
+def test_a_capsule_of_its_ballast_alone_stands_the_step(kind):
+    """(omega h)^2 <= 4 of the membrane's own vibrations with half of the mass: the other half is for a squeezed sheet.
+    The greatest is no less than the mean, by the trace 5 c A |grad N|^2 / 3 over m = 2 c A h^2 sum |grad N|^2: a
+    quadrilateral's four nodes share it evenly, a triangle's three, whose sum is counted twice at most."""
+    g = cases.sheared(SIZE, (3, 2, 2))
+    body = cases.plain(cases.tets(g) if kind == "tets" else g, np.arange(2.0)).body
+    c, h = 0.7, 2e-4
+    mass = np.repeat(np.asarray(capsule.ballast(body, c, h))[None], 3, 0).ravel()
+    on = mass > 0
+    slopes = jax.jit(jax.jacfwd(lambda u: capsule.forces(capsule.skin(body), c, u.reshape(3, -1)).ravel()))
+    K = np.asarray(slopes(jnp.zeros(mass.size)))[np.ix_(on, on)]
+    omega = np.sqrt(np.linalg.eigvalsh(K / np.sqrt(np.outer(mass[on], mass[on])))[-1])
+    assert set(np.flatnonzero(on[: len(g.points)])) == set(np.asarray(body.facets).ravel())
+    assert 5 / (24 if kind == "hexes" else 36) < (omega * h) ** 2 <= 2.0
 
 
 def test_a_bedding_slips_by_its_law():
@@ -129,28 +155,55 @@ def test_a_bedding_slips_by_its_law():
     assert np.abs(share @ np.asarray(slip.viscous)[1]) < 1e-3 * fluid * felt.sum() * interval
 
 
-@pytest.mark.parametrize("give", [0.0, 1.5e-8])
-def test_friction_slides_at_its_limit_and_sticks_below(give):
-    """A platen pressed on and dragged across a block that is held all round: |drag| = mu x push once it slides, and the
-    stiffness of the penalty's spring and of what gives, in series, times the way before."""
+def under_a_flat_face(kind, penalty=1e8, softness=1e-7):
+    """A block that is held all round, a platen and the patch of its upper face."""
     g = box(SIZE, (3, 2, 2))
+    g = cases.tets(g) if kind == "tets" else g
     rigid = Geometry(g.points, g.cells, g.cell_type, np.arange(len(g.points)))
     scene = cases.plain(rigid, np.arange(2.0))
     top = np.asarray(scene.body.facets)
     up = np.isclose(np.asarray(g.points)[top][:, :, 2], SIZE[2]).all(1)
-    probe = build.probe(scene, Platen(), np.arange(2.0), np.tile([0, 0, SIZE[2]], (2, 1)), top[up], 1e8, 1e-7)
+    path = np.tile([0, 0, SIZE[2]], (2, 1))
+    probe = build.probe(scene, Platen(), np.arange(2.0), path, top[up], penalty, softness)
+    return scene, probe, contact.patch(scene.put({"probe": probe}))
+
+
+@pytest.mark.parametrize("kind", ["hexes", "tets"])
+def test_the_penalty_stores_the_integral_of_the_pressure_over_the_approach(kind):
+    """p = penalty x softness x log(1 + exp z), z the depth over the softness, integrated by quadrature: from far off to
+    deep inside. Its series of 39 terms leaves at most the 40th."""
+    scene, probe, patch = under_a_flat_face(kind, softness=2e-5)
+    u = jnp.zeros_like(scene.body.points.T)
+    stored = jax.jit(jax.vmap(lambda z: contact.energy(probe, patch, u, jnp.array([0.0, 0.0, SIZE[2]]) - 2e-5 * z)))
+    z = np.array([-60.0, -8.0, -2.0, -0.5, 0.0, 0.3, 1.0, 4.0, 50.0])
+    exact = np.array([quad(lambda s: np.logaddexp(0, s), min(end, 0) - 40, end, epsrel=1e-11)[0] for end in z])
+    unit = 1e8 * 2e-5**2 * AREA
+    error = np.asarray(stored(jnp.asarray(z)[:, None] * jnp.array([0.0, 0.0, 1.0]))) / unit - exact
+    assert (np.abs(error) <= np.exp(-40 * np.abs(z)) / 40**2 + 1e-9 * exact).all()
+
+
+@pytest.mark.parametrize("by_c", [True, False], ids=["c", "xla"])
+@pytest.mark.parametrize("give", [0.0, 1.5e-8])
+def test_friction_slides_at_its_limit_and_sticks_below(give, by_c, monkeypatch):
+    """A platen pressed on and dragged across a block that is held all round: |drag| = mu x push once it slides, and the
+    stiffness of the penalty's spring and of what gives, in series, times the way before. Both are even over the face:
+    the torque is that of one force at its middle."""
+    if not by_c:
+        monkeypatch.setattr(native, "wanted", lambda: False)
+    scene, probe, patch = under_a_flat_face("hexes")
     probe = scene.put({"probe": probe}).put({"probe.friction": jnp.asarray(0.25)})
     probe = probe.put({"probe.give": jnp.asarray(give)}).probe
-    patch = contact.patch(scene.put({"probe": probe}))
     u = jnp.zeros_like(scene.body.points.T)
-    deep = SIZE[2] - 1e-5
-    above = jnp.array([0, 0, SIZE[2] + 1e-5])
+    aside, middle = np.array([0.007, -0.004, SIZE[2]]), np.array([0.0, 0.0, SIZE[2]])
+    above = jnp.asarray(aside + [0, 0, 1e-5])
     grip = contact.forces(probe, patch, u, above, contact.untouched(probe)).grip
     push = 1e8 * 1e-5 * AREA
     for way, drag in ((1e-6, 1e-6 / (1e-8 + give) * AREA), (2.6 * (1e-6 + 100 * give), 0.25 * push)):
-        felt = contact.forces(probe, patch, u, jnp.array([way, 0, deep]), grip)
+        at = aside + [way, 0, -1e-5]
+        felt = contact.forces(probe, patch, u, jnp.asarray(at), grip)
         assert float(felt.force[2]) == pytest.approx(push, rel=1e-6)
         assert float(felt.force[0]) == pytest.approx(-drag, rel=1e-6)
+        np.testing.assert_allclose(felt.torque, np.cross(middle - at, felt.force), rtol=1e-9)
 
 
 def test_a_platen_off_centre_feels_the_torque_of_its_force():

@@ -11,7 +11,7 @@ import pytest
 from tests.tled import cases
 from tissuejax.errors import InputError, UnstableSimulation
 from tissuejax.mesh.columns import box
-from tissuejax.tled import contact, internal, ledger, stream
+from tissuejax.tled import contact, internal, ledger, stable, stream
 from tissuejax.tled.build import ProbePath
 from tissuejax.tled.simulate import compiled, run
 from tissuejax.tled.step import machine
@@ -62,14 +62,19 @@ def _missing(scene, out):
 
 
 def test_a_free_fall_of_the_whole_body_is_exact():
-    """No node is held: u = g t^2 / 2 in central differences, and the momentum is m g t."""
+    """No node is held: u = g t^2 / 2 in central differences, and the momentum is m g t; half a step before, where the
+    speed is known, the kinetic energy is m v^2 / 2 with v = g t, and nothing is strained."""
     g = box((0.02, 0.02, 0.02), (2, 2, 2))
     times = np.arange(1, 21) * 1e-3
     held = np.zeros((len(g.fixed), 3))
-    out = run(cases.plain(g, times, gravity=(0, 0, -9.81), held=held, mass_damping=0.0))
+    scene = cases.plain(g, times, gravity=(0, 0, -9.81), held=held, mass_damping=0.0)
+    out = run(scene)
     t = float(out.end_time[-1]) - float(out.end_time[0]) + 1e-3
     assert np.allclose(out.state.u[2], -9.81 * t**2 / 2, rtol=1e-9)
     assert np.allclose(out.state.u[:2], 0, atol=1e-15)
+    speed = 9.81 * (np.asarray(out.check_time - out.check_time[-1]) + t - 0.5 * float(scene.clock.step))
+    np.testing.assert_allclose(out.checks.kinetic, 0.5 * 1000 * 0.02**3 * speed**2, rtol=1e-9)
+    assert np.abs(out.checks.internal).max() < 1e-12 * float(out.checks.kinetic[0])
 
 
 def test_second_order_in_the_step():
@@ -83,6 +88,21 @@ def test_second_order_in_the_step():
 
     a, b, c = (top(n) for n in (4, 8, 16))
     assert 3.3 < (a - b) / (b - c) < 4.7
+
+
+def test_what_is_not_given_is_chosen():
+    """Damping: half the lowest shear frequency, that of a quarter wave over the height. The clock begins half a frame
+    before the first middle, in steps of at most 0.7 of the critical one."""
+    g = box((0.03, 0.02, 0.012), (3, 2, 2))
+    times = 0.1 + np.arange(5) * 0.04
+    scene = cases.plain(g, times, compression=4.0)
+    c = np.sqrt(2 * cases.NEO["C10"] / 1000.0)
+    assert float(scene.settings.mass_damping) == pytest.approx(0.5 * 2 * np.pi * c / (4 * 0.012), rel=1e-12)
+    assert float(scene.clock.start) == pytest.approx(0.08)
+    most = 0.7 * float(stable.critical_steps(scene).min())
+    assert 0.01 / scene.clock.steps <= most < 0.01 / (scene.clock.steps - 1)
+    given = cases.plain(g, times, mass_damping=3.0, hourglass=0.2, stiffness_damping=1e-5, compression=4.0).settings
+    assert [float(x) for x in (given.mass_damping, given.hourglass, given.stiffness_damping)] == [3.0, 0.2, 1e-5]
 
 
 def test_a_step_above_the_critical_one_is_refused_and_one_forced_in_is_caught():

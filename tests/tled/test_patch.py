@@ -80,6 +80,52 @@ def test_forces_are_the_gradient_of_the_energy_and_the_tangent_is_symmetric(kind
     assert np.isclose(jnp.vdot(u, Kw), jnp.vdot(w, Ku), rtol=1e-9)
 
 
+def test_tets_share_their_pressure_at_the_nodes_that_they_share(rng):
+    """Energy and forces of Bonet and Burton's average, element by element in numpy: U(J_a), J_a the mean volume ratio
+    around a node by volume, K that of the stiffness field; neo-Hookean in shape. Forces by differences."""
+    g = cases.tets(cases.bent((0.02, 0.02, 0.02), (2, 2, 2)))
+    field = rng.uniform(0.5, 2.0, len(g.cells))
+    scene = cases.plain(g, np.arange(2.0)).put({"tissue.stiffness": jnp.asarray(field)})
+    cells, u = np.asarray(g.cells), 1e-3 * rng.normal(size=g.points.shape)
+    edges = lambda x: x[cells[:, 1:]] - x[cells[:, :1]]  # noqa: E731
+    inverse = np.linalg.inv(edges(g.points))
+    volume = np.linalg.det(edges(g.points)) / 6
+
+    def spread(x):
+        return np.bincount(cells.ravel(), np.repeat(volume * x / 4, 4), len(g.points))
+
+    def energy(u):
+        F = (inverse @ edges(g.points + u)).swapaxes(1, 2)
+        J = np.linalg.det(F)
+        shape = cases.NEO["C10"] * ((F**2).sum((1, 2)) * J ** (-2 / 3) - 3)
+        U = 0.5 * cases.BULK["K"] * (spread(J) / spread(1.0) - 1) ** 2
+        return np.sum(volume * field * shape) + np.sum(spread(field) * U)
+
+    mesh = internal.mesh(scene)
+    told = jax.jit(lambda u: internal.internal_energy(scene, mesh, u)[0])(jnp.asarray(u.T))
+    assert float(told) == pytest.approx(energy(u), rel=1e-12)
+    f, size = balance(scene, u)
+    for node, axis in ((0, 2), (5, 0), (13, 1), (26, 2)):
+        step = np.zeros_like(u)
+        step[node, axis] = 1e-8
+        assert f[node, axis] == pytest.approx((energy(u + step) - energy(u - step)) / 2e-8, abs=1e-6 * size)
+
+
+def test_the_fastest_vibration_of_a_chain_is_the_root_of_its_greatest_eigenvalue():
+    """Two masses between two walls, springs k (s + s^3) drawn out by e: (1 + 3 e^2) K along, nothing across."""
+    mass, k, e = np.array([1.0, 2e-3, 5e-3, 1.0]), 3.0, 0.4
+    held = jnp.ones((3, 4), bool).at[0, 1:3].set(False)
+
+    def force(u):
+        s = jnp.diff(u[0])
+        t = k * (s + s**3)
+        return jnp.zeros_like(u).at[0].set(jnp.pad(-t, (0, 1)) + jnp.pad(t, (1, 0)))
+
+    found = jax.jit(lambda u: stable.fastest(force, jnp.asarray(mass), held, u))(e * jnp.tile(jnp.arange(4.0), (3, 1)))
+    K = k * (1 + 3 * e**2) * np.array([[2, -1], [-1, 2]]) / np.sqrt(np.outer(mass[1:3], mass[1:3]))
+    assert float(found) == pytest.approx(np.sqrt(np.linalg.eigvalsh(K)[-1]), rel=1e-9)
+
+
 @pytest.mark.parametrize("kind", ["hexes", "tets", "tall", "bent", "bending", "tall bending"])
 def test_the_critical_step_is_that_of_the_fastest_vibration(kind):
     """Largest eigenvalue of M^-1 K by power iteration on a free-topped block, against the estimate and its safety."""

@@ -12,7 +12,7 @@ from tissuejax.errors import NotConverged, UnstableSimulation
 from tissuejax.mesh.columns import box
 from tissuejax.recordings.recording import Geometry
 from tissuejax.tled import build, gravity, pressed, statics
-from tissuejax.tled.shapes import Hemisphere
+from tissuejax.tled.shapes import Hemisphere, Platen, Sphere
 from tissuejax.tled.simulate import run
 
 BALL = 0.004  # m
@@ -46,6 +46,58 @@ def test_waves_cross_a_squeezed_element_sooner():
     """K alone at constant volume: d2U/dF33^2 = K / l^2, so the step falls with l (the shear modulus is a hundredth)."""
     scene = tissue(ReducedPolynomial(order=1), dict(C10=50.0), K=20e3)
     assert pressed.quickening(scene, 0.5) == pytest.approx(2.0, rel=0.03)
+
+
+LAYER = box((0.04, 0.04, 0.02), (8, 8, 4)).points
+
+
+def lowered(radius, deep):
+    """A path whose lowest point has the tip so deep in the layer."""
+    return np.array([[0.0, 0.0, 0.02 + radius + up] for up in (0.01, -deep, 0.005)])
+
+
+@pytest.mark.parametrize(("deep", "measured"), [(0.002, 0.69), (0.004, 0.53), (0.006, 0.35)])
+def test_elements_under_a_ball_shorten_as_was_measured(deep, measured):
+    """Neo-Hookean tissue, R 4.75 mm, 20 mm thick; a node that sticks out elsewhere makes the ball no deeper."""
+    R = 0.00475
+    humped = LAYER + [0.0, 0.0, 0.005] * (np.linalg.norm(LAYER[:, :2] - 0.01, axis=1) < 1e-9)[:, None]
+    for points in (LAYER, humped):
+        np.testing.assert_allclose(pressed.depth(points, Sphere(R), lowered(R, deep)), (deep, 0.02), rtol=1e-12)
+        assert pressed.shortest_stretch(points, Sphere(R), lowered(R, deep)) == pytest.approx(measured, rel=0.08)
+
+
+def test_a_layer_is_compressed_by_what_is_pressed_into_it():
+    """To 1 - d/h as a whole, at worst 1.2 times as much in the logarithm: under a platen, and a ball wide against the
+    layer. A ball adds 0.2 a/R with a^2 = 2 R d (Tabor), a <= R; deeper than its radius it squeezes little more."""
+    flat, deep = Platen(), lowered(0.0, 0.005)
+    assert pressed.shortest_stretch(LAYER, flat, deep) == pytest.approx(0.75**1.2)
+    assert pressed.typical_stretch(LAYER, flat, deep) == pytest.approx(0.75)
+    wide, deep = Sphere(0.05), lowered(0.05, 0.01)
+    assert pressed.shortest_stretch(LAYER, wide, deep) == pytest.approx(0.5**1.2)
+    assert pressed.typical_stretch(LAYER, wide, deep) == pytest.approx(0.5 * np.exp(-0.2 * np.sqrt(0.4)))
+    small, deep = Sphere(0.002), lowered(0.002, 0.006)
+    assert pressed.shortest_stretch(LAYER, small, deep) == pytest.approx(np.exp(-1.1))
+    assert pressed.typical_stretch(LAYER, small, deep) == pytest.approx(0.7 * np.exp(-0.2))
+    for shape, radius in ((flat, 0.0), (small, 0.002)):
+        for stretch in (pressed.shortest_stretch, pressed.typical_stretch):
+            assert stretch(LAYER, shape, lowered(radius, -0.001)) == 1.0  # does not touch
+
+
+def test_elements_within_two_radii_of_the_path_may_be_squeezed():
+    """In plan, wherever on its way the probe is; at least the nearest one, all of them under a platen."""
+    g = box((0.04, 0.04, 0.02), (8, 8, 2))
+    path = np.linspace([-0.0125, 0.0025, 0.03], [0.0025, 0.0025, 0.02], 40)  # over centres of elements, 5 mm apart
+
+    def under(shape):
+        found = np.asarray(g.points)[np.asarray(g.cells)[pressed.near(g.points, g.cells, shape, path)]].mean(1)
+        return {(round(1e4 * x), round(1e4 * y)) for x, y, _ in found}
+
+    row = {(x, 25) for x in (-125, -75, -25, 25)}
+    assert under(Sphere(0.001)) == row
+    assert under(Sphere(0.0026)) == row | {(-175, 25), (75, 25)} | {(x, y) for x, _ in row for y in (-25, 75)}
+    assert len(under(Platen())) == 64
+    path = path + [0.0, 0.1, 0.0]
+    assert under(Sphere(0.001)) == {(x, 175) for x, _ in row}
 
 
 def block(depth: float, shape=BALL, counts=(8, 8, 5), energy=None, values=None, **options):

@@ -1,5 +1,6 @@
 """A flat punch with a rounded edge as a probe: its distance, and its force on a bonded layer."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -41,6 +42,24 @@ def test_the_distance_is_that_of_the_nearest_point_of_the_outline(rng):
         smooth = np.abs(np.linalg.norm(normal, axis=0) - 1) < 1e-9
         assert smooth.all()
         assert np.quantile(np.abs(slope - normal[k]), 0.98) < 1e-6  # but beside the bisector of face and side
+
+
+def test_the_normal_turns_with_the_point_in_every_region():
+    """Its derivative, backwards, in closed form: one over the distance from the axis around the side, from the edge's
+    circle around that, none under the face; inside the core, where nothing is nearer than the face or the side, too."""
+    core, circle = RADIUS - EDGE, EDGE - RADIUS
+    places = [
+        ((0.6 * core, -RADIUS - 3e-4), (0.0, 0.0)),  # under the face
+        ((0.6 * core, circle + 2e-4), (0.0, 0.0)),  # in the core, the face nearer
+        ((core - 2e-4, circle + 1e-3), (0.0, 1.0 / (core - 2e-4))),  # in the core, the side nearer
+        ((RADIUS + 3e-4, 0.001), (0.0, 1.0 / (RADIUS + 3e-4))),  # beside the side
+        ((core + 3e-4, circle - 4e-4), (0.64 / 5e-4, 0.6 / (core + 3e-4))),  # at the edge: 3, 4, 5
+    ]
+    turn = jax.jit(jax.vmap(jax.jacrev(lambda x: jnp.stack(Punch(RADIUS, EDGE).distance(tuple(x))[1]))))
+    found = np.asarray(turn(jnp.asarray([(rho, 0.0, z) for (rho, z), _ in places])))
+    for made, (_, (radial, around)) in zip(found, places, strict=True):
+        assert made[0, 0] == pytest.approx(radial, rel=1e-9, abs=1e-9)
+        assert made[1, 1] == pytest.approx(around, rel=1e-9, abs=1e-9)
 
 
 def layer_factor(ratio, n):

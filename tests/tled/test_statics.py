@@ -59,6 +59,26 @@ def test_gravity_brings_the_measured_shape_back():
     assert np.allclose(back, BLOCK.points, atol=1e-8)
 
 
+@pytest.mark.parametrize("rounds", [1, 3, 40])
+def test_each_round_brings_the_shape_nearer_by_the_sag_of_its_own(monkeypatch, rounds):
+    """An organ that gravity shrinks by s of itself: X = x / (1 - s), reached as a geometric series. After so many
+    rounds the miss is that power of s, and a search that has come to 1e-7 of the height goes on no longer."""
+    s = 0.2
+
+    def shrunk(scene, **options):
+        zero = jnp.zeros(())
+        return statics.Equilibrium(-s * scene.body.points, zero, jnp.asarray(0), jnp.zeros(3), zero > 0)
+
+    monkeypatch.setattr(statics, "equilibrium", shrunk)
+    scene = cases.plain(BLOCK, np.arange(2.0), order=2, gravity=DOWN)
+    found = gravity.stress_free(scene, rounds=rounds)
+    taken = min(rounds, 11)  # the largest coordinate is 15 mm, the height 12 mm: s^10 > 0.8e-7 > s^11
+    assert float(found.miss) == pytest.approx(0.015 * s**taken, rel=1e-3)
+    exact = BLOCK.points / (1 - s)
+    np.testing.assert_allclose(found.scene.body.points, exact - s ** (taken + 1) * exact, atol=1e-15)
+    np.testing.assert_allclose(found.scene.body.settled, BLOCK.points - found.scene.body.points, atol=1e-15)
+
+
 @pytest.mark.slow
 def test_the_unloaded_shape_follows_the_material():
     scene = cases.plain(BLOCK, np.arange(2.0), order=2, gravity=DOWN)
@@ -77,6 +97,61 @@ def test_what_has_no_answer_says_so():
         gravity.stress_free(cases.plain(BLOCK, np.arange(2.0)))
     with pytest.raises(NotConverged, match="no static equilibrium after 25 iterations"):
         statics.checked(statics.compiled(cases.plain(BLOCK, np.arange(2.0), gravity=DOWN), most=25))
+
+
+@pytest.mark.parametrize(("longest", "last"), [(0.3, 1.0), (1 / 64, 1.0), (0.99 / 64, 0.0)])
+def test_a_load_is_led_in_steps_that_find_their_equilibrium(monkeypatch, longest, last):
+    """Of a search that finds equilibrium only so near to the last one: halved down to a 64th of the way it arrives,
+    and each search begins where the one before ended. Where a 64th is too far it says so."""
+    tried = []
+
+    def near(scene, when, **options):
+        begun = float(scene.body.settled.max())
+        tried.append((begun, when))
+        u = jnp.full_like(scene.body.points, when if when <= begun + longest else jnp.nan)
+        return statics.Equilibrium(u, jnp.asarray(1e-3), jnp.asarray(25), jnp.zeros(3), jnp.asarray(False))
+
+    monkeypatch.setattr(statics, "compiled", near)
+    scene = cases.plain(BLOCK, 0.5 + np.arange(2.0))
+    assert float(scene.clock.start) == 0.0
+    if last < 1:
+        with pytest.raises(NotConverged, match=r"beyond 0% of the way \(t = 0 of 1 s\): unbalanced force 1.0e-03"):
+            statics.gradual(scene, 1.0)
+        assert [when for _, when in tried] == [0.5**k for k in range(7)]
+        return
+    assert float(statics.gradual(scene, 1.0).displacement.max()) == last
+    reached = [0.0]
+    for (begun, when), (_, then) in zip(tried, tried[1:] + [(1.0, 1.0)], strict=True):
+        assert begun == reached[-1]
+        step = when - begun
+        if step > longest:
+            assert then == begun + step / 2
+        else:
+            assert then == min(1.0, when + 2 * step)
+            reached.append(when)
+    assert reached[-1] == 1.0
+    assert np.diff(reached[:-1]).min() > longest / 2  # longer steps are tried again
+
+
+def test_gravity_is_led_before_the_way(monkeypatch):
+    """Where the probe and the support are at the start; a body that has settled already skips it."""
+    tried = []
+
+    def found(scene, when, **options):
+        tried.append((float(scene.gravity[2]), when, float(scene.body.settled.max())))
+        u = jnp.full_like(scene.body.points, len(tried) if tried[-1][0] < -1 else jnp.nan)
+        return statics.Equilibrium(u, jnp.asarray(1e-3), jnp.asarray(25), jnp.zeros(3), jnp.asarray(False))
+
+    monkeypatch.setattr(statics, "compiled", found)
+    scene = cases.plain(BLOCK, 0.5 + np.arange(2.0), gravity=DOWN)
+    statics.gradual(scene, 0.8)
+    assert tried == [(-9.81, 0.0, 0.0), (-9.81, 0.8, 1.0)]
+    tried.clear()
+    statics.gradual(scene.put({"body.settled": jnp.full_like(scene.body.points, 7.0)}), 0.8)
+    assert tried == [(-9.81, 0.8, 7.0)]
+    weak = scene.put({"gravity": jnp.array([0.0, 0.0, -0.5])})
+    with pytest.raises(NotConverged, match=r"beyond 0% of gravity: .* is 0.005 times its shear modulus"):
+        statics.gradual(weak, 0.8)
 
 
 def test_an_answer_with_inverted_elements_is_none():
