@@ -123,7 +123,7 @@ def test_a_capsule_carries_the_tension_of_a_stretched_membrane(kind):
 def test_a_capsule_of_its_ballast_alone_stands_the_step(kind):
     """(omega h)^2 <= 4 of the membrane's own vibrations with half of the mass: the other half is for a squeezed sheet.
     The greatest is no less than the mean, by the trace 5 c A |grad N|^2 / 3 over m = 2 c A h^2 sum |grad N|^2: a
-    quadrilateral's four nodes share it evenly, a triangle's three, whose sum is counted twice at most."""
+    quadrilateral's four nodes share it evenly, and a triangle's three."""
     g = cases.sheared(SIZE, (3, 2, 2))
     body = cases.plain(cases.tets(g) if kind == "tets" else g, np.arange(2.0)).body
     c, h = 0.7, 2e-4
@@ -133,7 +133,7 @@ def test_a_capsule_of_its_ballast_alone_stands_the_step(kind):
     K = np.asarray(slopes(jnp.zeros(mass.size)))[np.ix_(on, on)]
     omega = np.sqrt(np.linalg.eigvalsh(K / np.sqrt(np.outer(mass[on], mass[on])))[-1])
     assert set(np.flatnonzero(on[: len(g.points)])) == set(np.asarray(body.facets).ravel())
-    assert 5 / (24 if kind == "hexes" else 36) < (omega * h) ** 2 <= 2.0
+    assert 5 / (24 if kind == "hexes" else 18) < (omega * h) ** 2 <= 2.0
 
 
 def test_a_bedding_slips_by_its_law():

@@ -60,9 +60,9 @@ def ballast(body: Body, capsule: Float[Array, ""], step: Float[Array, ""]) -> Fl
     A facet's stiffness is at most k = 4 c area sum |grad N|^2 (plane stress of an incompressible sheet, trace bound);
     nodes of mass k h^2 / 4 vibrate with omega h <= 2. Twice that, since a squeezed sheet stiffens.
     """
-    ((aa, _, bb), area, nodes, _) = skin(body)  # inverse metric of the mid-point
+    ((aa, ab, bb), area, nodes, _) = skin(body)  # inverse metric of the mid-point
     count = nodes.shape[0]
-    spread = aa + bb if count == 4 else 2 * (aa + bb)
+    spread = aa + bb if count == 4 else 2 * (aa + ab + bb)
     mass = 2 * (4 * capsule * area * spread) * step**2 / 4
     return (
         jnp.zeros_like(body.points[:, 0]).at[nodes].add(jnp.broadcast_to(mass, nodes.shape).astype(body.points.dtype))
