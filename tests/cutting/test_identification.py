@@ -1,5 +1,7 @@
 """What is read from a cutting record without a simulation: teeth, resolution, refusals."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -64,6 +66,31 @@ def test_even_teeth_at_the_period_of_a_mesh_are_named():
     found = sawtooth(made.recordings["r"], made.geometry, Settings(cutoff=10.0))
     assert "period of elements" in mesh_period(found, 3e-3)
     assert mesh_period(found, 1.1e-3) is None
+
+
+def test_a_mesh_is_named_as_far_as_its_period_goes():
+    """To 15 % of an element or of half of one, where gaps scatter by a quarter at most, of four teeth on."""
+    h = 2e-3
+
+    def told(share, scatter=0.0, n=5):
+        gaps = share * h * (1 + scatter * (-1.0) ** np.arange(n - 1))
+        teeth = [SimpleNamespace(at=x) for x in np.cumsum([0.01, *gaps])]
+        return mesh_period(SimpleNamespace(teeth=teeth), h) is not None
+
+    assert all(told(share) for share in (0.86, 1.14, 0.43, 0.57))
+    assert not any(told(share) for share in (0.84, 1.16, 0.42, 0.58))
+    assert told(1.0, scatter=0.24)
+    assert not told(1.0, scatter=0.26)
+    assert told(1.0, n=4)
+    assert not told(1.0, n=3)
+
+
+def test_a_filter_is_refused_from_half_the_sampling_rate_on():
+    made = sample(record("r", TIME, X, toothed()))
+    assert sawtooth(made.recordings["r"], made.geometry, Settings(cutoff=49.0)).cutoff == 49.0
+    for cutoff in (0.0, 50.5):
+        with pytest.raises(InputError, match=r"half the sampling rate \(50 Hz\)"):
+            sawtooth(made.recordings["r"], made.geometry, Settings(cutoff=cutoff))
 
 
 def test_resolution_by_hand():
