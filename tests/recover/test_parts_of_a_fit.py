@@ -1,6 +1,7 @@
 """The small rules that a fit is made of, each against its formula, scipy, or what it must do with known numbers."""
 
 import dataclasses
+import itertools
 from types import SimpleNamespace
 
 import jax
@@ -255,6 +256,31 @@ def test_further_starts_vary_by_what_is_stated(rng):
     beyond = scipy.stats.norm.sf(np.log(2) / SPREAD)
     below = 0.5 + 0.5 * beyond
     assert np.mean(rate < 10) == pytest.approx(below, abs=4 * np.sqrt(below * (1 - below) / n))
+
+
+def test_moduli_between_bounds_are_the_best_of_all_faces(rng):
+    """The minimum of a convex problem by trying which bounds hold; columns that differ ten thousandfold in size."""
+    low, high, at_bound = np.array([0.5, -30.0, -2.0]), np.array([2.0, 30.0, 400.0]), 0
+    size = np.array([1.0, 0.01, 100.0])
+    for _ in range(20):
+        J, target = rng.normal(size=(12, 3)) * size, 2.0 * rng.normal(size=12)
+        faces = []
+        for held in itertools.product((low, high, None), repeat=3):
+            x = np.array([0.0 if end is None else end[i] for i, end in enumerate(held)])
+            loose = [i for i, end in enumerate(held) if end is None]
+            x[loose] = np.linalg.lstsq(J[:, loose], target - J @ x, rcond=None)[0]
+            if np.all((x >= low) & (x <= high)):
+                faces.append((float(np.sum((J @ x - target) ** 2)), tuple(x), tuple(end is None for end in held)))
+        _, best, loose = min(faces)
+        now = np.array([1.0, 2.0, 3.0])
+        solved, left, inside = Projection.solve(SimpleNamespace(low=low, high=high), J @ now - target, J, now)
+        np.testing.assert_allclose(solved * size, best * size, atol=1e-8)
+        np.testing.assert_allclose(left, J @ best - target, atol=1e-8)
+        assert tuple(inside) == loose
+        mirrored = Projection.solve(SimpleNamespace(low=-high, high=-low), J @ now - target, -J, -now)
+        assert tuple(mirrored[2]) == loose
+        at_bound += not all(loose)
+    assert at_bound > 5
 
 
 def test_what_moduli_can_absorb_is_taken_out_of_the_other_columns(rng):
