@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from tissuejax.errors import UnstableSimulation
+from tissuejax.estimation.derivatives import AGE, NOTHING, Corrected
 from tissuejax.estimation.descent import descend
 from tissuejax.estimation.ending import Ending
 from tissuejax.estimation.methods import broyden, marquardt, trust_region
@@ -74,6 +75,46 @@ def test_a_jacobian_from_elsewhere_is_good_for_one_step_only():
     found = descend(Decay(), START, boxed([-9, -9], [9, 9], known=wrong))
     right = descend(Decay(), START, trust_region(2))
     assert found.cost == pytest.approx(right.cost, rel=1e-4)
+
+
+class Columns(LeastSquares):
+    """Three columns of lengths 5, 13 and 25, whatever the place."""
+
+    J = np.array([[3.0, 5.0, 7.0], [4.0, 12.0, -24.0]])
+
+    def residuals(self, y):
+        return self.J @ y
+
+    def jacobian(self, y):
+        return self.J
+
+
+def test_a_column_that_is_nothing_but_error_calls_for_no_step():
+    """Below a hundred-thousandth of the largest effect, length times scale: here of 5 x 2."""
+    source = Corrected(Columns())
+    scale = np.array([2.0, 0.9 * NOTHING * 10 / 13, 1.1 * NOTHING * 10 / 25])
+    whole, cleared = source.at(np.zeros(3), scale)
+    np.testing.assert_array_equal(whole, Columns.J)
+    np.testing.assert_array_equal(cleared, Columns.J * [1, 0, 1])
+
+
+def test_a_correction_foretells_the_step_and_leaves_what_is_across_it(rng):
+    """Broyden's: J s grows by what was missed, J v stays for v across s; three in a row, then it is computed anew."""
+    source, y, ones = Corrected(Columns()), np.zeros(3), np.ones(3)
+    before = source.at(y, ones)[0]
+    for age in range(AGE):
+        step, missed = rng.normal(size=3), 0.01 * rng.normal(size=2)
+        source.moved(step, missed, kept=True)
+        after = source.at(y, ones)[0]
+        np.testing.assert_allclose((after - before) @ step, missed, atol=1e-14)
+        across = np.cross(step, [1.0, 2.0, 3.0])
+        np.testing.assert_allclose(after @ across, before @ across, atol=1e-12)
+        assert (source.age, source.count, source.exact) == (age + 1, 1, False)
+        before = after
+    for kept, count in ((True, 2), (False, 3)):  # a fourth correction; then a step that broke its promise
+        source.moved(step, missed, kept)
+        np.testing.assert_array_equal(source.at(y, ones)[0], Columns.J)
+        assert (source.age, source.count, source.exact) == (0, count, True)
 
 
 class Cliff(Decay):

@@ -1,33 +1,57 @@
 """The small rules that a fit is made of, each against its formula, scipy, or what it must do with known numbers."""
 
 import dataclasses
+import itertools
 from types import SimpleNamespace
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 import scipy.optimize
-from toy import ToyPredictor, toy_sample
+import scipy.stats
+from toy import ToyModel, ToyPredictor, toy_sample
 
 from tissuejax.estimation.losses import soften
 from tissuejax.estimation.numerical import changes
 from tissuejax.estimation.problem import Problem
+from tissuejax.estimation.transforms import WHOLE
 from tissuejax.estimation.weights import Weights, noise
 from tissuejax.experiments.probing_settings import REFINED, ProbingSettings
+from tissuejax.fitting import sobol as sobol_module
 from tissuejax.fitting.cut_resolution import resolution
-from tissuejax.fitting.gradient_descent import gradient_descent
+from tissuejax.fitting.gradient_descent import gradient_descent, objective
 from tissuejax.fitting.least_squares import fit
-from tissuejax.fitting.memory import begun_loaded
+from tissuejax.fitting.memory import LENGTHS, begun_loaded, spread
 from tissuejax.fitting.options import Search
 from tissuejax.fitting.profile import profile
+from tissuejax.fitting.scores import score
 from tissuejax.fitting.separable import Projection
+from tissuejax.fitting.sobol import sobol
+from tissuejax.fitting.starts import LEAST, SPREAD, fitted_moduli, variations
+from tissuejax.parameters import Parameter
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 TRUE = {"energy.a": 80.0, "energy.b": 40.0, "energy.rate": 0.7, "energy.offset": 5.0}
 
 
-def problem(sample, free, **options):
-    predictor = ToyPredictor(sample)
-    return Problem(predictor, free, predictor.model.defaults | TRUE, noise(sample, predictor.names, "auto"), **options)
+def problem(sample, free, kind=ToyPredictor, **options):
+    predictor = kind(sample)
+    start = {path: d.default for path, d in predictor.model.parameters.items()} | TRUE | options.pop("start", {})
+    return Problem(predictor, free, start, noise(sample, predictor.names, "auto"), **options)
+
+
+class Shared(ToyPredictor):
+    """Beside the curve's constants some that it does not depend on: three parts of one whole, one that is bounded
+    from above and one that is not bounded; priors alone tell of them."""
+
+    class model(ToyModel):  # noqa: N801
+        parameters = ToyModel.parameters | {
+            **{f"effects.e.g{i}": Parameter(f"g{i}", "1", 0.1, lower=0.0, upper=1.0) for i in (1, 2, 3)},
+            "effects.e.below": Parameter("below", "1", -2.0, upper=1.0),
+            "effects.e.any": Parameter("any", "1", 3.0),
+        }
+        effects = (SimpleNamespace(name="e", shares=("g1", "g2", "g3")),)
 
 
 @pytest.mark.parametrize(("name", "scipys"), [("soft-l1", "soft_l1"), ("cauchy", "cauchy")])
@@ -151,3 +175,185 @@ def test_numbers_in_the_sentences_on_a_cut_s_resolution():
     assert np.sqrt(9 * np.pi * plane * G / (32 * 3 * size)) == pytest.approx(2 * G / b, rel=5e-3)
     thin = resolution(4000.0, G, 1564.0, 2e4, b, 1e-5, 0.02, 0.005).sentences
     assert any(f"A strength above {2 * G / b:.4g} Pa parts it" in s for s in thin)
+
+
+def test_a_score_is_what_its_names_are_defined_as():
+    """Errors 1/2, 0, -1, 0 and a lost sample about a mean of 3: squares 5/4 of a total of 10."""
+    measured = [1.0, 2.0, np.nan, 4.0, 5.0]
+    told = score(measured, [1.5, 2.0, 7.0, 3.0, 5.0], 0.25, "Pa")
+    assert dataclasses.astuple(told) == pytest.approx((0.3125**0.5, "Pa", 5.0, 4, 0.875, 0.0))
+    assert score(measured, measured, 1.0, "Pa").r2 == 1.0
+    assert score(measured, np.full(5, 3.0), 1.0, "Pa").r2 == 0.0
+    flat = score(np.full(8, 3.0), 3.0 + (-1.0) ** np.arange(8), 0.5, "Pa")
+    assert np.isnan(flat.r2)  # no spread to explain
+    assert (flat.rmse, flat.chi2_per_sample, flat.autocorrelation) == (1.0, 4.0, -7 / 8)
+    lost = score(np.full(3, np.nan), np.zeros(3), 1.0, "Pa")
+    assert lost.n == 0
+    assert np.isnan([lost.rmse, lost.chi2_per_sample, lost.r2]).all()
+
+
+def test_parts_of_a_whole_share_what_the_fixed_ones_leave(rng):
+    sample, g = toy_sample(rng, TRUE, n=10), [f"effects.e.g{i}" for i in (1, 2, 3)]
+    part = problem(sample, ("energy.a", g[2], g[1]), Shared, start={g[0]: 0.3})
+    (group,) = part.box.sticks
+    assert group.members == (2, 1)  # in the order of the shares
+    full = part.box.bounded(np.full(3, 50.0))[0]  # each takes the most of what is left
+    assert full[2] == pytest.approx(0.7 * WHOLE)
+    assert full[1] == pytest.approx(0.7 * (1 - WHOLE) * WHOLE)
+    (group,) = problem(sample, tuple(g), Shared).box.sticks
+    assert group.whole == 1.0
+    assert problem(sample, tuple(g[:2]), Shared, start={g[2]: 1.0}).box.sticks == ()  # nothing is left
+    assert problem(sample, tuple(g), Shared, bounds={g[1]: (0.0, 0.5)}).box.sticks == ()
+
+
+@pytest.mark.parametrize(("loss", "scipys"), [("squares", "linear"), ("soft-l1", "soft_l1"), ("cauchy", "cauchy")])
+def test_what_gradient_methods_minimise_is_half_the_losses_of_data_and_priors(rng, loss, scipys):
+    """At known values, each of the five kinds of bounds among them; the cost of fixed residuals is scipy's."""
+    at = TRUE | {"energy.offset": -3.0, "effects.e.g1": 0.2, "effects.e.g2": 0.5, "effects.e.g3": 0.15}
+    at |= {"effects.e.below": 0.4, "effects.e.any": -7.0}
+    priors = {path: (0.8 * value + 0.1, 0.3 * abs(value)) for path, value in at.items()}
+    sample = toy_sample(rng, TRUE, n=20, noise=2.0)
+    p = problem(sample, tuple(at), Shared, priors=priors, loss=loss)
+    r = [(at[path] - mean) / std for path, (mean, std) in priors.items()]
+    for recording in sample.recordings.values():
+        channel = recording.channels["nominal_stress"]
+        rate = at["energy.rate"] * channel.time
+        y = at["energy.a"] * np.exp(-rate) + at["energy.b"] * np.exp(-3 * rate) + at["energy.offset"]
+        r.extend((y - channel.values) / 2.0)
+    expected = scipy.optimize.least_squares(lambda x: np.array(r) + 0 * x, 0.0, loss=scipys).cost
+    assert float(jax.jit(objective(p))(p.box.free(p.vector(at)))) == pytest.approx(expected, rel=1e-9)
+
+
+def test_moduli_to_begin_with_are_the_non_negative_least_squares(rng):
+    """scipy's at two rates; at the slow one the slow term comes out as zero and keeps a thousandth of the data."""
+    sample, zeros = toy_sample(rng, TRUE, n=40), []
+    p = problem(sample, ("energy.a", "energy.b", "energy.rate"))
+    channels = [r.channels["nominal_stress"] for r in sample.recordings.values()]
+    t, y = (np.concatenate([getattr(c, what) for c in channels]) for what in ("time", "values"))
+    for rate in (0.7, 0.2):
+        columns = np.exp(-rate * t[:, None] * [1, 3])
+        solved = scipy.optimize.nnls(columns, y - TRUE["energy.offset"])[0]
+        least = LEAST * np.linalg.norm(y - TRUE["energy.offset"]) / np.linalg.norm(columns, axis=0)
+        found = fitted_moduli(p, p.start | {"energy.rate": rate, "energy.a": 1.0, "energy.b": 1.0})
+        assert [found["energy.a"], found["energy.b"]] == pytest.approx(np.maximum(solved, least), rel=1e-6)
+        assert found["energy.rate"] == rate
+        zeros.append(int(np.sum(solved == 0)))
+    assert zeros == [0, 1]
+
+
+def test_further_starts_vary_by_what_is_stated(rng):
+    """Logarithms by 0.7, signs kept; from zero by 0.7 of the scale; beyond a range anywhere in its inner 96 %."""
+    n, first = 1000, TRUE | {"energy.a": 80.0, "energy.b": 40.0, "energy.rate": 10.0, "energy.offset": 0.0}
+    p = problem(toy_sample(rng, TRUE, n=10), tuple(TRUE))
+    drawn = {path: np.array([v[path] for v in variations(p, first, n, 3)]) for path in TRUE}
+    steps = [np.log(drawn["energy.a"] / 80.0), np.log(drawn["energy.b"] / 40.0), drawn["energy.offset"] / 10.0]
+    steps.append(np.log([v["energy.offset"] / -5.0 for v in variations(p, first | {"energy.offset": -5.0}, n, 4)]))
+    for step in steps:  # four standard errors
+        assert np.std(step) == pytest.approx(SPREAD, abs=4 * SPREAD / np.sqrt(2 * n))
+        assert np.mean(step) == pytest.approx(0.0, abs=4 * SPREAD / np.sqrt(n))
+    rate = drawn["energy.rate"]
+    assert np.all((rate > 0) & (rate < 20))
+    beyond = scipy.stats.norm.sf(np.log(2) / SPREAD)
+    below = 0.5 + 0.5 * beyond
+    assert np.mean(rate < 10) == pytest.approx(below, abs=4 * np.sqrt(below * (1 - below) / n))
+
+
+def test_moduli_between_bounds_are_the_best_of_all_faces(rng):
+    """The minimum of a convex problem by trying which bounds hold; columns that differ ten thousandfold in size."""
+    low, high, at_bound = np.array([0.5, -30.0, -2.0]), np.array([2.0, 30.0, 400.0]), 0
+    size = np.array([1.0, 0.01, 100.0])
+    for _ in range(20):
+        J, target = rng.normal(size=(12, 3)) * size, 2.0 * rng.normal(size=12)
+        faces = []
+        for held in itertools.product((low, high, None), repeat=3):
+            x = np.array([0.0 if end is None else end[i] for i, end in enumerate(held)])
+            loose = [i for i, end in enumerate(held) if end is None]
+            x[loose] = np.linalg.lstsq(J[:, loose], target - J @ x, rcond=None)[0]
+            if np.all((x >= low) & (x <= high)):
+                faces.append((float(np.sum((J @ x - target) ** 2)), tuple(x), tuple(end is None for end in held)))
+        _, best, loose = min(faces)
+        now = np.array([1.0, 2.0, 3.0])
+        solved, left, inside = Projection.solve(SimpleNamespace(low=low, high=high), J @ now - target, J, now)
+        np.testing.assert_allclose(solved * size, best * size, atol=1e-8)
+        np.testing.assert_allclose(left, J @ best - target, atol=1e-8)
+        assert tuple(inside) == loose
+        mirrored = Projection.solve(SimpleNamespace(low=-high, high=-low), J @ now - target, -J, -now)
+        assert tuple(mirrored[2]) == loose
+        at_bound += not all(loose)
+    assert at_bound > 5
+
+
+def test_what_moduli_can_absorb_is_taken_out_of_the_other_columns(rng):
+    """Kaufman's (1 - C C+) J with the pseudo-inverse, C the columns of those moduli that rest on no bound."""
+    J, linear = rng.normal(size=(9, 5)), np.array([True, False, True, True, False])
+    solver = SimpleNamespace(linear=linear, low=np.array([0.0, 0.0, 0.0]), high=np.array([9.0, 9.0, 9.0]))
+    for x, loose in (([1.0, 0, 2.0, 3.0, 0], [0, 2, 3]), ([1.0, 0, 0.0, 3.0, 0], [0, 3]), ([9.0, 0, 0.0, 0.0, 0], [])):
+        C = J[:, loose]
+        expected = J[:, ~linear] - C @ np.linalg.pinv(C) @ J[:, ~linear]
+        np.testing.assert_allclose(Projection._projected(solver, J, np.array(x)), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("still", "top", "limit"),
+    [
+        (4, 200.0, 10.0),  # four standard errors of the mean of four samples
+        (5, 200.0, 4 * 5 / 5**0.5),  # of the first five where nothing is done in them
+        (4, 400.0, 12.0),  # 3 % of the largest stress
+    ],
+)
+def test_a_load_at_rest_is_told_from_its_limit_on(still, top, limit):
+    time, up = np.arange(40.0), np.clip((np.arange(40) - still + 1) / 20, 0, 1)
+
+    def told(level, sign=1):
+        stress = np.where(up > 0, top * up, level + 2.0 * (-1.0) ** np.arange(40))
+        stress[still - 1] = still * level - stress[: still - 1].sum()
+        channel = Channel(time, sign * stress, "Pa", 5.0)
+        made = Recording("r", "uniaxial", {"time": time, "stretch": 1 + 0.2 * up}, {"nominal_stress": channel}, {})
+        return begun_loaded({"r": made}, ["r"], Weights({"r/nominal_stress": 5.0}))
+
+    assert told(0.98 * limit) == []
+    for sign in (1, -1):
+        (said,) = told(1.02 * limit, sign)
+        assert f"r (a stress of {1.02 * limit:.3g} Pa at rest) begins under load" in said
+
+
+def test_times_to_begin_with_are_even_in_their_logarithm():
+    """Between the bounds, the slower one at the length of the recording; each effect's own."""
+    one = {f"effects.one.tau{i}": (1.0, LENGTHS * 1e4) for i in (1, 2, 3)}
+    other = {"effects.other.tau1": (0.01, LENGTHS * 100.0)}
+    assert list(spread(one | other).values()) == pytest.approx([10.0, 100.0, 1000.0, 1.0])
+
+
+def test_sobol_indices_of_a_product_are_those_by_hand(rng):
+    """y = a exp(-k t) + c: V = Va E(e)^2 + E(a)^2 Ve + Va Ve + Vc; interaction is in the totals of a and k alone."""
+    predictor = ToyPredictor(toy_sample(rng, TRUE, n=30, names=("r1",)))
+    ranges = {"energy.a": (50.0, 150.0), "energy.rate": (0.2, 1.0), "energy.offset": (-10.0, 10.0)}
+    found = sobol(predictor, TRUE | {"energy.b": 0.0}, ranges, n=1024)
+    t = np.linspace(0, 3, 30)[np.linspace(0, 29, 12).round().astype(int)]
+    e = np.exp(-t[:, None] * (0.2 + 0.8 * (np.arange(1000) + 0.5) / 1000))
+    a, k, both, c = 1e4 / 12 * e.mean(1) ** 2, 1e4 * e.var(1), 1e4 / 12 * e.var(1), np.full(12, 400 / 12)
+    total = np.sum(a + k + both + c)
+    first = np.array([a.sum(), k.sum(), c.sum()]) / total
+    np.testing.assert_allclose(found.first["r1/nominal_stress"], first, atol=0.03)
+    whole = first + both.sum() / total * np.array([1, 1, 0])
+    np.testing.assert_allclose(found.total["r1/nominal_stress"], whole, atol=0.03)
+    assert (found.n, found.failed) == (5 * 1024, 0.0)
+
+
+def test_sobol_indices_are_the_same_in_batches_and_one_by_one(rng, monkeypatch):
+    """20 predictions in batches of 8, the last one filled up; where half of them fail, that is the share told."""
+
+    class Failing(ToyPredictor):
+        def predict(self, values):
+            a = values["energy.a"]
+            return super().predict(dict(values) | {"energy.a": jnp.where(a > 100.0, jnp.nan, a)})
+
+    monkeypatch.setattr(sobol_module, "BATCH", 8)
+    sample = toy_sample(rng, TRUE, n=15, names=("r1",))
+    ranges = {"energy.a": (50.0, 150.0), "energy.rate": (0.2, 1.0), "energy.b": (0.0, 10.0)}
+    for kind, failed in ((ToyPredictor, 0.0), (Failing, 0.5)):
+        many, one = (sobol(kind(sample), TRUE, ranges, n=4, batched=b) for b in (True, False))
+        for told in ("first", "total"):
+            np.testing.assert_allclose(*(getattr(s, told)["r1/nominal_stress"] for s in (many, one)), rtol=1e-9)
+        assert many.n == one.n == 20
+        assert many.failed == one.failed == pytest.approx(failed, abs=0.2)

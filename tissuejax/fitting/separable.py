@@ -91,7 +91,9 @@ class Projection(LeastSquares):
         inside = (solved >= self.low) & (solved <= self.high)
         if not inside.all():
             answer = lsq_linear(columns / size, target, (self.low * size, self.high * size), method="bvls")
-            solved = np.clip(answer.x / size, self.low, self.high)
+            # where a bound holds it is that very number, which low * size / size need not be
+            solved = np.where(answer.active_mask < 0, self.low, np.clip(answer.x / size, self.low, self.high))
+            solved = np.where(answer.active_mask > 0, self.high, solved)
             inside = (solved > self.low) & (solved < self.high)
         return solved, r + columns @ (solved - now), inside
 
