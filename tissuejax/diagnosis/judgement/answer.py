@@ -6,7 +6,7 @@ nothing at all is fitted to it, and its error is that of the prediction.
 """
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -29,6 +29,8 @@ from tissuejax.diagnosis.misfit import Misfit, white
 from tissuejax.diagnosis.refit import Refit, refit
 from tissuejax.diagnosis.score import Score
 from tissuejax.estimation.discrepancy import Discrepancy
+
+STEPS = 100  # of a fit that is shown
 
 
 @dataclass
@@ -197,17 +199,29 @@ def answer(
 
 
 def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
-    """The fit of a set to the fitted recordings alone, and its misfit over the stated noise; remembered."""
+    """The fit of a set to the fitted recordings alone, and its misfit over the stated noise; remembered.
+
+    What is shown of material tests is the model as near as it comes to the recordings, by least squares, as a fit of it
+    is: under the whole discrepancy, which is free to be anything smooth, parameters may settle far from there and
+    describe the data as well with it. Where parts that a name widens belong to the model, they and their company stay,
+    but for what the laws of effects err by. Standard errors are those under the whole discrepancy.
+    """
     weighed, scales = out.exploration.weighed[frozenset(keys)], out.exploration.scales
     start = {p: v for p, v in weighed.refit.values.items() if p in out.fitting.free}
     bench = out.fitting.anchored(start)
-    whitening = Whitening(bench, scales.cut, scales.blocked, weighed.parts, weighed.v, scales.widened(keys))
+    named = scales.widened(keys)
+    whitening = Whitening(bench, scales.cut, scales.blocked, weighed.parts, weighed.v, named)
     misfit = whitening if keys else white(bench)
     fit = refit(bench, misfit, keys, start)
-    for key in () if bench.costly else keys:
-        while (fewer := merged(bench.candidates[key], fit.values)) is not None:
-            out.fitting.candidates = bench.candidates = {**bench.candidates, key: fewer[0]}
-            fit = refit(bench, misfit, keys, fewer[1])
+    if keys and not bench.costly:
+        exact = np.where([p.family == "effect" for p in weighed.parts], 0.0, weighed.v)
+        model = replace(whitening, v=exact, _roots={}) if named else white(bench)
+        near = nearest(bench, model, keys, (start, fit.values, {}))
+        for key in keys:
+            while (fewer := merged(bench.candidates[key], near.values)) is not None:
+                out.fitting.candidates = bench.candidates = {**bench.candidates, key: fewer[0]}
+                near = nearest(bench, model, keys, (fewer[1],))
+        fit = replace(refit(bench, misfit, keys, near.values, iterations=0), converged=near.converged)
     near = bench.anchored(fit.values)
     if near is not bench:
         fit = replace(fit, prediction=near.predict(fit.values))
@@ -225,6 +239,12 @@ def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
         n_held=int(np.sum(outside)),
     )
     return out.refits[frozenset(keys)]
+
+
+def nearest(bench: Bench, model: Misfit, keys: tuple[str, ...], starts: Sequence[Mapping[str, float]]) -> Refit:
+    """The fit by least squares over what the model leaves open, from whichever start ends nearest."""
+    ends = [refit(bench, model, keys, s, iterations=STEPS, final=False) for s in starts]
+    return min(ends, key=lambda f: f.chi2 if np.isfinite(f.chi2) else np.inf)
 
 
 def squares(z: Float[np.ndarray, " n"]) -> float:
