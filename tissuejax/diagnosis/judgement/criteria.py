@@ -24,7 +24,6 @@ class Criteria:
             n about 400, it makes 85 % of the answers right, and all of the evidence 73 %. Where the likeliest set
             leaves noise there is no rest to be wrong about, and all of the evidence counts: n is the number of block
             means times the share of what is left that is not noise.
-        counted: block means that count at most: those of a material test. More are more channels of one motion.
         shares: standard deviation of the half-normal prior of a discrepancy's amplitude, a share of the stress, by
             family. Ground: what the best published laws leave of careful recordings, 1 to 4 % of the peak in all; of a
             surface that is met early or late, of the depth of a press; of a blade's entry, the peak that its shoulder
@@ -61,7 +60,6 @@ class Criteria:
     sizes: tuple[float, ...] = (0.4, 0.4, 0.15, 0.05)
     unknown: float = 0.1
     coarse: float = 200.0
-    counted: int = 400
     shares: Mapping[str, float] = field(
         default_factory=lambda: (
             {"law": 0.015, "gain": 0.015, "hysteresis": 0.01, "added law": 0.01, "slow": 0.01, "white": 0.005}
@@ -86,4 +84,4 @@ class Criteria:
 
     def power(self, n: int, left: float = 1.0) -> float:
         """Of the evidence of n block means, that sets are compared by; `left`: the share of a rest in what is left."""
-        return self.coarse / (self.coarse + min(n, self.counted) * left)
+        return self.coarse / (self.coarse + n * left)
