@@ -212,15 +212,20 @@ def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
     named = scales.widened(keys)
     whitening = Whitening(bench, scales.cut, scales.blocked, weighed.parts, weighed.v, named)
     misfit = whitening if keys else white(bench)
-    fit = refit(bench, misfit, keys, start)
+
+    def with_fewer(found: Refit, again: Callable[[Mapping[str, float]], Refit]) -> Refit:
+        for key in () if bench.costly else keys:
+            while (fewer := merged(bench.candidates[key], found.values)) is not None:
+                out.fitting.candidates = bench.candidates = {**bench.candidates, key: fewer[0]}
+                found = again(fewer[1])
+        return found
+
+    fit = with_fewer(refit(bench, misfit, keys, start), lambda at: refit(bench, misfit, keys, at))
     if keys and not bench.costly:
         exact = np.where([p.family == "effect" for p in weighed.parts], 0.0, weighed.v)
         model = replace(whitening, v=exact, _roots={}) if named else white(bench)
         near = nearest(bench, model, keys, (start, fit.values, {}))
-        for key in keys:
-            while (fewer := merged(bench.candidates[key], near.values)) is not None:
-                out.fitting.candidates = bench.candidates = {**bench.candidates, key: fewer[0]}
-                near = nearest(bench, model, keys, (fewer[1],))
+        near = with_fewer(near, lambda at: nearest(bench, model, keys, (at,)))
         fit = replace(refit(bench, misfit, keys, near.values, iterations=0), converged=near.converged)
     near = bench.anchored(fit.values)
     if near is not bench:
