@@ -6,7 +6,7 @@ and predicts a third, with slack and drift on offer. Counted is how often its 95
 gap holds the truth, among all specimens of which it named slack. Beside that the scatter of the estimates over their
 mean standard error: one if the errors are right, from either side.
 
-tissuejax study fits/coverage          (DRAWS=120 in the environment for fewer; cases that have as many are kept)
+tissuejax study fits/coverage          (DRAWS=120 in the environment for fewer; cases that this code drew as often are kept)
 """
 
 import json
@@ -18,6 +18,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import binom
 
+from tissuejax.cache.source import LOADED
 from tissuejax.diagnosis.diagnose import diagnose
 from tissuejax.recordings.recording import Channel, Recording, Sample
 from tissuejax.storage import write_figure, write_json
@@ -105,8 +106,9 @@ def main(folder: Path) -> str:
     kept = folder / "result.json"
     record = json.loads(kept.read_text()) if kept.is_file() else {"cases": {}}
     for name, case in CASES.items():
-        if record["cases"].get(name, {}).get("draws", 0) < DRAWS:
-            record["cases"][name] = counted(case)
+        known = record["cases"].get(name, {})
+        if known.get("draws", 0) < DRAWS or known.get("code") != LOADED:
+            record["cases"][name] = counted(case) | {"code": LOADED}
             write_json(kept, record)
     write_figure(folder / "figures" / "coverage.png", drawn(record), dpi=110)
     every = [p["coverage_95"] for c in record["cases"].values() for p in c["parameters"].values()]

@@ -203,8 +203,9 @@ def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
 
     What is shown of material tests is the model as near as it comes to the recordings, by least squares, as a fit of it
     is: under the whole discrepancy, which is free to be anything smooth, parameters may settle far from there and
-    describe the data as well with it. Where parts that a name widens belong to the model, they and their company stay,
-    but for what the laws of effects err by. Standard errors are those under the whole discrepancy.
+    describe the data as well with it. Parts that a name widens belong to the model; they are fitted after the
+    parameters, with them, or with them beside all other parts but what laws of effects err by, whichever comes nearest.
+    Standard errors are those under the whole discrepancy.
     """
     weighed, scales = out.exploration.weighed[frozenset(keys)], out.exploration.scales
     start = {p: v for p, v in weighed.refit.values.items() if p in out.fitting.free}
@@ -220,17 +221,26 @@ def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
                 found = again(fewer[1])
         return found
 
-    fit = with_fewer(refit(bench, misfit, keys, start), lambda at: refit(bench, misfit, keys, at))
+    fit, takes = with_fewer(refit(bench, misfit, keys, start), lambda at: refit(bench, misfit, keys, at)), whitening
     if keys and not bench.costly:
-        exact = np.where([p.family == "effect" for p in weighed.parts], 0.0, weighed.v)
-        model = replace(whitening, v=exact, _roots={}) if named else white(bench)
-        near = nearest(bench, model, keys, (start, fit.values, {}))
-        near = with_fewer(near, lambda at: nearest(bench, model, keys, (at,)))
+        families = [p.family for p in weighed.parts]
+        own, exact = (
+            replace(whitening, v=np.where(kept, weighed.v, 0.0), _roots={})
+            for kept in ([f in named for f in families], [f != "effect" for f in families])
+        )
+        ends = []
+        for model, taken in ((white(bench), own), *(((own, own), (exact, exact)) if named else ())):
+            near = nearest(bench, model, keys, (start, fit.values, {}))
+            near = with_fewer(near, lambda at, model=model: nearest(bench, model, keys, (at,)))
+            left = bench.y - near.prediction
+            left = (left - carried(taken, left[:, None])[:, 0])[bench.mask(bench.fitted)]
+            ends.append((squares(left / bench.sigma[bench.mask(bench.fitted)]), near, taken))
+        _, near, takes = min(ends, key=lambda end: end[0])
         fit = replace(refit(bench, misfit, keys, near.values, iterations=0), converged=near.converged)
     near = bench.anchored(fit.values)
     if near is not bench:
         fit = replace(fit, prediction=near.predict(fit.values))
-    fit = replace(fit, prediction=fit.prediction + carried(whitening, (bench.y - fit.prediction)[:, None])[:, 0])
+    fit = replace(fit, prediction=fit.prediction + carried(takes, (bench.y - fit.prediction)[:, None])[:, 0])
     out.plain[frozenset(keys)], out.whitenings[frozenset(keys)] = fit, whitening
     shown = out.bench
     fit = replace(fit, prediction=bench.natural(fit.prediction))
