@@ -6,7 +6,7 @@ and predicts a third, with slack and drift on offer. Counted is how often its 95
 gap holds the truth, among all specimens of which it named slack. Beside that the scatter of the estimates over their
 mean standard error: one if the errors are right, from either side.
 
-tissuejax study fits/coverage          (DRAWS=120 in the environment for fewer; cases that this code drew as often are kept)
+tissuejax study fits/coverage          (DRAWS=120 in the environment for fewer; what this code drew as often is kept)
 """
 
 import json

@@ -229,7 +229,9 @@ def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
             for kept in ([f in named for f in families], [f != "effect" for f in families])
         )
         ends = []
-        for model, taken in ((white(bench), own), *(((own, own), (exact, exact)) if named else ())):
+        # what is of each recording's own reaches no other: the parameters are fitted to all as if it were not there
+        shared = ((own, own), (exact, exact)) if named - {"gain"} else ()
+        for model, taken in ((white(bench), own), *shared):
             near = nearest(bench, model, keys, (start, fit.values, {}))
             near = with_fewer(near, lambda at, model=model: nearest(bench, model, keys, (at,)))
             left = bench.y - near.prediction
