@@ -3,7 +3,7 @@
     python tests/bench/bench_diagnosis.py [doors] [material] [p01 p02 p03 p04]
 
 Each is run twice with one program cache: first empty, then filled. Wall and CPU seconds (of all processes; both cores).
-Material tests: the first twelve of the sealed set whose seed is 450aa57 (`fits/challenge/material-eleventh`), made anew
+Material tests: the first six of the sealed set whose seed is 450aa57 (`fits/challenge/material-eleventh`), made anew
 here. Probings: the practice recordings beside the checkout, or where `TISSUEJAX_SHARED` says. What is named on the
 command line is measured and replaces its lines in `results/diagnosis.json`, everything by default.
 """
@@ -22,7 +22,7 @@ from bench_step import RESULTS, write
 
 ROOT = Path(__file__).resolve().parents[2]
 SHARED = Path(os.environ.get("TISSUEJAX_SHARED", ROOT.parent / "shared")) / "practice"
-SEED, CASES = "450aa57b4a3e09a0a1ed2ac1415819d32a9c21d4", 12
+SEED, CASES = "450aa57b4a3e09a0a1ed2ac1415819d32a9c21d4", 6
 DOORS = {
     "tissuejax --help": ("-m", "tissuejax", "--help"),
     "import tissuejax": ("-c", "import tissuejax"),
