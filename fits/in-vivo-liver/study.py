@@ -4,6 +4,7 @@ tissuejax study fits/in-vivo-liver
 """
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -82,17 +83,16 @@ def measured(body: Lobe, name: str, rng: np.random.Generator) -> Sample:
     model = Model(entry.energy, volumetric("quadratic"))
     values = {f"energy.{k}": v for k, v in entry.constants.items()} | {"volumetric.K": K}
     told = predictor(model, blank, settings=TRUTH).predict(values)[name]
-    noisy = {
-        c: Channel(
-            ch.time,
-            np.asarray(told.channels[c].values) + rng.normal(0, ch.noise_std, ch.values.shape),
-            ch.unit,
-            ch.noise_std,
-        )
-        for c, ch in blank.recordings[name].channels.items()
+    return Sample("lobe", {name: noisy(blank.recordings[name], told, rng)}, blank.geometry, 1060.0)
+
+
+def noisy(blank: Recording, told: Recording, rng: np.random.Generator) -> Recording:
+    """What was foretold, with the noise that the sensors of `blank` state, channel by channel."""
+    channels = {
+        c: replace(ch, values=np.asarray(told.channels[c].values) + rng.normal(0, ch.noise_std, ch.values.shape))
+        for c, ch in blank.channels.items()
     }
-    old = blank.recordings[name]
-    return Sample("lobe", {name: Recording(name, "probing", old.inputs, noisy, old.attributes)}, blank.geometry, 1060.0)
+    return replace(blank, channels=channels)
 
 
 def scaled(p, name: str, start: dict, told: Recording) -> dict:

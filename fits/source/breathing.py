@@ -66,14 +66,7 @@ def recorded(study: dict, span: float) -> tuple[Sample, Recording]:
     p = predictor(site_model(True), sample, settings=study["TRUTH"].changed(compression=8.0, processes=1))
     told = p.predict(values)[NAME]
     rng = np.random.default_rng([2012, 226])
-    noisy = {
-        c: Channel(
-            ch.time, told.channels[c].values + rng.normal(0, ch.noise_std, ch.values.shape), ch.unit, ch.noise_std
-        )
-        for c, ch in blank.channels.items()
-    }
-    full = Recording(NAME, "probing", blank.inputs, noisy, blank.attributes)
-    return Sample("lobe", {NAME: full}, sample.geometry, 1060.0), told
+    return Sample("lobe", {NAME: study["noisy"](blank, told, rng)}, sample.geometry, 1060.0), told
 
 
 def read_off(sample: Sample) -> tuple[float, float, float]:

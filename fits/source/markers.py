@@ -4,6 +4,7 @@ Ex vivo law, each turn of the stress curve, and the fit by gradients that the st
 """
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from tissuejax.energies.published import published
 from tissuejax.experiments.predictor import predictor
 from tissuejax.fitting.stress_curve import stress_curve
 from tissuejax.model import Model
-from tissuejax.recordings.recording import Channel, Recording, Sample
+from tissuejax.recordings.recording import Recording
 
 TOUCH = 0.3 + 1e-3 / 1.25e-3  # s, of the study's rig: the probe comes down by 1 mm before
 
@@ -26,21 +27,11 @@ class Quiet:
         return np.full(shape, mean)
 
 
-def noisy(quiet: Sample, name: str, rng: np.random.Generator) -> Sample:
-    """The sample with the study's noise on its one recording."""
-    old = quiet.recordings[name]
-    channels = {
-        c: Channel(ch.time, ch.values + rng.normal(0, ch.noise_std, ch.values.shape), ch.unit, ch.noise_std)
-        for c, ch in old.channels.items()
-    }
-    new = Recording(name, old.experiment, old.inputs, channels, old.attributes)
-    return Sample(quiet.name, {name: new}, quiet.geometry, quiet.density)
-
-
 def site(folder: Path, study: dict, name: str) -> dict:
     """Errors of each law that could be simulated, beside the truth without noise and beside the recording."""
     quiet = study["measured"](study["lobe"](), name, Quiet())
-    sample = noisy(quiet, name, np.random.default_rng([2012, list(study["SITES"]).index(name)]))
+    was, rng = quiet.recordings[name], np.random.default_rng([2012, list(study["SITES"]).index(name)])
+    sample = replace(quiet, recordings={name: study["noisy"](was, was, rng)})
     entry = published(study["START"])
     start = {f"energy.{k}": float(v) for k, v in entry.constants.items()} | {"volumetric.K": study["K"]}
     p = predictor(Model(entry.energy, volumetric("quadratic")), sample, settings=study["FIT"])

@@ -1,9 +1,11 @@
 """Every quantitative result of the source's chapters 2 to 4 beside ours: what can be computed here is, in steps kept.
 
-tissuejax study fits/source          twenty minutes or so; parts that are in result.json are not run again
+tissuejax study fits/source          twenty minutes or so; parts that the same code made are kept
+
+PARTS="cylinder;breathing" in the environment: only parts whose names begin so (and such as are missing); PARTS=none
+draws table and figures of what is there.
 """
 
-import json
 import runpy
 from pathlib import Path
 
@@ -11,7 +13,8 @@ import jax
 import numpy as np
 from matplotlib.figure import Figure
 
-from tissuejax.storage import write_json, write_text
+from tissuejax.cache.parts import Parts
+from tissuejax.storage import write_text
 
 jax.config.update("jax_enable_x64", True)
 
@@ -24,22 +27,23 @@ PUBLISHED = {"a_N": 0.009991, "b_1_m": 373.6, "r_squared": 0.9998}  # eq. 4.14
 CYLINDER_ERROR = 3e-4  # N, 4.1.1.1
 
 
-class Kept:
-    """result.json as it grows: each part is worked out once."""
+def needed(folder: Path) -> dict[str, tuple[Path, ...]]:
+    """Files beside the package that each kind of part depends on."""
+    liver, bench = folder.parent / "in-vivo-liver", folder.resolve().parents[1] / "tests" / "bench" / "results"
+    scripts = ("study", "lobe", "cylinder", "deep", "markers", "breathing", "table")
+    study, lobe, cylinder, deep, markers, breathing, table = (folder / f"{n}.py" for n in scripts)
+    rig, fitted = liver / "study.py", liver / "result.json"
+    return {
+        "table": (table, fitted, bench / "step.json", bench / "contact.json"),
+        "lobe": (study, lobe),
+        "cylinder": (study, cylinder),
+        "deep": (study, deep, rig),
+        "markers": (study, markers, rig, fitted),
+        "breathing": (study, breathing, rig),
+    }
 
-    def __init__(self, folder: Path):
-        self.path = folder / "result.json"
-        self.parts = json.loads(self.path.read_text()) if self.path.exists() else {}
 
-    def get(self, name: str, work):
-        """The part of that name, worked out by `work()` unless it is there."""
-        if name not in self.parts:
-            self.parts[name] = work()
-            write_json(self.path, self.parts)
-        return self.parts[name]
-
-
-def lobe_parts(lobe: dict, kept: Kept) -> None:
+def lobe_parts(lobe: dict, kept: Parts, needs: tuple[Path, ...]) -> None:
     """The settled lobe and the press, on two meshes; the other Ogden forms and reversed gravity on the coarse one."""
     for name, counts in (("coarse", COARSE), ("middle", MIDDLE)):
         shapes = {}
@@ -49,26 +53,26 @@ def lobe_parts(lobe: dict, kept: Kept) -> None:
                 shapes["at"] = lobe["settled"](counts)
             return shapes["at"]
 
-        kept.get(f"settled, {name}", lambda shape=shape: lobe["sag"](*shape()))
+        kept.get(f"settled, {name}", lambda shape=shape: lobe["sag"](*shape()), needs)
         for radius, r in RADII.items():
-            kept.get(f"pressed, {name}, {radius}", lambda shape=shape, r=r: lobe["pressed"](*shape(), r))
+            kept.get(f"pressed, {name}, {radius}", lambda shape=shape, r=r: lobe["pressed"](*shape(), r), needs)
     for counts in SAGS:
         name = f"sag, {' x '.join(map(str, counts))}"
-        kept.get(name, lambda counts=counts: sagging(lobe, counts))
+        kept.get(name, lambda counts=counts: sagging(lobe, counts), needs)
     for form in lobe["FORMS"][1:]:
-        kept.get(f"settled, coarse, {form}", lambda form=form: settled_or_not(lobe, form))
-    kept.get("gravity reversed and applied again", lambda: lobe["reversed_gravity"](COARSE))
+        kept.get(f"settled, coarse, {form}", lambda form=form: settled_or_not(lobe, form), needs)
+    kept.get("gravity reversed and applied again", lambda: lobe["reversed_gravity"](COARSE), needs)
 
 
-def cylinder_parts(cylinder: dict, kept: Kept) -> None:
+def cylinder_parts(cylinder: dict, kept: Parts, needs: tuple[Path, ...]) -> None:
     """The compressed cylinder of 4.1.1.1, each law with each bulk modulus."""
     for law in cylinder["LAWS"]:
         for bulk in cylinder["BULKS"]:
             name = f"cylinder, {law}, K {1e-6 * bulk:g} MPa"
-            kept.get(name, lambda law=law, bulk=bulk: cylinder["compressed"](law, bulk))
+            kept.get(name, lambda law=law, bulk=bulk: cylinder["compressed"](law, bulk), needs)
 
 
-def site_parts(folder: Path, kept: Kept) -> None:
+def site_parts(folder: Path, kept: Parts, needs: dict[str, tuple[Path, ...]]) -> None:
     """The synthetic sites of fits/in-vivo-liver: pressed to 3 N, their errors by marker, and one that breathes."""
     deep, markers, breathing = (runpy.run_path(str(folder / f"{n}.py")) for n in ("deep", "markers", "breathing"))
 
@@ -76,9 +80,9 @@ def site_parts(folder: Path, kept: Kept) -> None:
         return runpy.run_path(str(folder.parent / "in-vivo-liver" / "study.py"))
 
     for name in deep["DEEPEST"]:
-        kept.get(f"to 3 N, {name}", lambda name=name: deep["site"](study(), name, SITE_MESH))
-        kept.get(f"by marker, {name}", lambda name=name: markers["site"](folder, study(), name))
-    kept.get("breathing", lambda: breathing["breathing"](study()))
+        kept.get(f"to 3 N, {name}", lambda name=name: deep["site"](study(), name, SITE_MESH), needs["deep"])
+        kept.get(f"by marker, {name}", lambda name=name: markers["site"](folder, study(), name), needs["markers"])
+    kept.get("breathing", lambda: breathing["breathing"](study()), needs["breathing"])
 
 
 def sagging(lobe: dict, counts: tuple[int, int, int]) -> dict:
@@ -97,7 +101,7 @@ def settled_or_not(lobe: dict, form: str) -> dict:
         return {"no answer": str(error)}
 
 
-def draw_lobe(kept: Kept) -> Figure:
+def draw_lobe(kept: Parts) -> Figure:
     """Force over depth of the pressed lobe, and eq. 4.14."""
     figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     axes = figure.subplots()
@@ -117,7 +121,7 @@ def draw_lobe(kept: Kept) -> Figure:
     return figure
 
 
-def draw_cylinder(kept: Kept, cylinder: dict) -> Figure:
+def draw_cylinder(kept: Parts, cylinder: dict) -> Figure:
     """Force over stretch beside eq. 4.11, and the distance between them beside the source's greatest."""
     figure = Figure(figsize=(8.5, 3.6), layout="constrained")
     force, error = figure.subplots(1, 2)
@@ -138,7 +142,7 @@ def draw_cylinder(kept: Kept, cylinder: dict) -> Figure:
     return figure
 
 
-def draw_sites(kept: Kept) -> Figure:
+def draw_sites(kept: Parts) -> Figure:
     """Force over depth until 3 N: the law in vivo that stands for the tissue, and the ex vivo law."""
     figure = Figure(figsize=(8.5, 3.2), layout="constrained")
     parts = {name.split(", ")[1]: part for name, part in kept.parts.items() if name.startswith("to 3 N")}
@@ -170,16 +174,18 @@ def draw_breathing(part: dict) -> Figure:
 
 def main(folder: Path) -> str:
     """Run what is missing, write result.json, table.md and the figure; the answer in a sentence."""
-    kept = Kept(folder)
+    needs = needed(folder)
+    kept = Parts(folder / "result.json", {file for files in needs.values() for file in files})
     lobe, cylinder, table = (runpy.run_path(str(folder / f"{n}.py")) for n in ("lobe", "cylinder", "table"))
     for name, work in table["PARTS"].items():
-        kept.get(name, lambda work=work: work(folder))
-    lobe_parts(lobe, kept)
+        kept.get(name, lambda work=work: work(folder), needs["table"])
+    lobe_parts(lobe, kept, needs["lobe"])
     for name, part in list(kept.parts.items()):
         if name.startswith("pressed"):
-            kept.get(f"eq. 4.14, {name}", lambda part=part: lobe["exponential"](part["depth_mm"], part["force_N"]))
-    cylinder_parts(cylinder, kept)
-    site_parts(folder, kept)
+            way = part["depth_mm"], part["force_N"]
+            kept.get(f"eq. 4.14, {name}", lambda way=way: lobe["exponential"](*way), needs["lobe"], of=way)
+    cylinder_parts(cylinder, kept, needs["cylinder"])
+    site_parts(folder, kept, needs)
     rows = table["rows"](kept.parts)
     write_text(folder / "table.md", table["text"](rows))
     (folder / "figures").mkdir(exist_ok=True)
@@ -192,7 +198,8 @@ def main(folder: Path) -> str:
     for name, picture in pictures.items():
         picture.savefig(folder / "figures" / f"{name}.png", dpi=100)
     beside = sum(row.ours != "" for row in rows)
-    return f"{beside} of {len(rows)} results of the source stand beside ours; the others say why not"
+    answer = f"{beside} of {len(rows)} results of the source stand beside ours; the others say why not"
+    return ". ".join(filter(None, (answer, kept.said())))
 
 
 if __name__ == "__main__":

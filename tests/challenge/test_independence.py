@@ -6,7 +6,7 @@ from pathlib import Path
 import tissuejax.challenge as room
 
 FOLDER = Path(room.__file__).parent
-TOOLS = {"errors", "storage", "progress", "challenge"}  # messages, files, progress: no physics, no statistics
+TOOLS = {"errors", "storage", "progress", "parent", "challenge"}  # messages, files, processes: no physics, no numbers
 # they call the diagnosis from outside, as a user would, and ask the model that it found for a prediction
 RUNNERS = {"run.py": {"diagnosis"}, "kept.py": {"diagnosis", "energies", "recordings"}}
 

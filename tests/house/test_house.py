@@ -18,7 +18,8 @@ from tests.conftest import LONGEST, outside
 ROOT = Path(tissuejax.__file__).parent
 PROJECT = ROOT.parent
 FLOORS = [
-    {"arrays", "errors", "families", "parameters", "tensors", "spectral", "units", "progress", "storage", "cache"},
+    {"arrays", "errors", "families", "parameters", "tensors", "spectral", "units"}
+    | {"progress", "parent", "storage", "cache"},
     {"energies"},
     {"recordings"},
     {"mesh"},

@@ -171,7 +171,7 @@ def under_a_flat_face(kind, penalty=1e8, softness=1e-7):
 @pytest.mark.parametrize("kind", ["hexes", "tets"])
 def test_the_penalty_stores_the_integral_of_the_pressure_over_the_approach(kind):
     """p = penalty x softness x log(1 + exp z), z the depth over the softness, integrated by quadrature: from far off to
-    deep inside. Its series of 39 terms leaves at most the 40th."""
+    deep inside. The pressure is cut off at z = -40, where exp(-40) of it is left."""
     scene, probe, patch = under_a_flat_face(kind, softness=2e-5)
     u = jnp.zeros_like(scene.body.points.T)
     stored = jax.jit(jax.vmap(lambda z: contact.energy(probe, patch, u, jnp.array([0.0, 0.0, SIZE[2]]) - 2e-5 * z)))
@@ -179,7 +179,36 @@ def test_the_penalty_stores_the_integral_of_the_pressure_over_the_approach(kind)
     exact = np.array([quad(lambda s: np.logaddexp(0, s), min(end, 0) - 40, end, epsrel=1e-11)[0] for end in z])
     unit = 1e8 * 2e-5**2 * AREA
     error = np.asarray(stored(jnp.asarray(z)[:, None] * jnp.array([0.0, 0.0, 1.0]))) / unit - exact
-    assert (np.abs(error) <= np.exp(-40 * np.abs(z)) / 40**2 + 1e-9 * exact).all()
+    assert (np.abs(error) <= 1e-11 * exact + np.exp(-40)).all()
+
+
+def test_the_energy_of_contact_is_the_integral_of_its_own_force(monkeypatch):
+    """Work of the force over the way to each depth by Gauss's rule, twenty points to a softness, where all changes."""
+    monkeypatch.setattr(native, "wanted", lambda: False)
+    scene, probe, patch = under_a_flat_face("hexes", softness=2e-5)
+    u, touched = jnp.zeros_like(scene.body.points.T), contact.untouched(probe)
+    at = lambda z: jnp.array([0.0, 0.0, SIZE[2] - 2e-5 * z])  # noqa: E731
+    push = jax.jit(jax.vmap(lambda z: contact.forces(probe, patch, u, at(z), touched).force[2]))
+    place, weight = np.polynomial.legendre.leggauss(20)
+    ends = np.arange(-40.0, 45.0)
+    along = ends[:-1, None] + (place + 1) / 2
+    work = 2e-5 * np.cumsum(np.asarray(push(along.ravel())).reshape(along.shape) @ weight / 2)
+    stored = np.asarray(jax.jit(jax.vmap(lambda z: contact.energy(probe, patch, u, at(z))))(ends))
+    assert np.allclose(stored[1:], work, rtol=1e-12, atol=0)  # the gap itself is known to 1e-13 softnesses
+    assert abs(stored[0]) < 1e-12 * work[0]
+
+
+@pytest.mark.parametrize(("kind", "rounding"), [(jnp.float64, 4e-16), (jnp.float32, 3e-7)], ids=["double", "single"])
+def test_the_energy_of_contact_has_no_jump(kind, rounding):
+    """At the gap of zero, where two forms of the integral meet in pi^2 / 12, and where the pressure is cut off."""
+    tiny = float(jnp.finfo(kind).tiny)
+    stored = np.asarray(contact.approached(jnp.asarray([-tiny, 0.0, tiny], kind)))
+    assert np.allclose(stored, np.pi**2 / 12, rtol=rounding, atol=0)
+    faint = np.asarray(contact.approached(jnp.asarray([-40.0, -40 + 1e-5], kind)), float)
+    assert faint[0] == 0
+    assert abs(faint[1]) < 1e-22
+    slope = jax.vmap(jax.grad(contact.approached))(jnp.asarray([-30.0, -3.0, -0.1, 0.1, 3.0, 30.0], kind))
+    assert np.allclose(slope, np.logaddexp(0, [-30.0, -3.0, -0.1, 0.1, 3.0, 30.0]), rtol=3 * rounding, atol=0)
 
 
 @pytest.mark.parametrize("by_c", [True, False], ids=["c", "xla"])

@@ -11,6 +11,8 @@ from contextlib import suppress
 from multiprocessing.process import BaseProcess
 from typing import Any, NamedTuple, Protocol
 
+from tissuejax.parent import leave_with_parent
+
 GRACE = 30.0  # s beyond the limit until a case that does not stop is killed
 
 Work = Callable[[str, dict[str, Any]], dict[str, Any]]
@@ -88,6 +90,7 @@ def _begun(work: Work) -> Running:
 
 def _serve(pipe: Pipe, work: Work) -> None:
     """Answer until the parent is gone."""
+    leave_with_parent()
     with suppress(EOFError, OSError, KeyboardInterrupt):
         while True:
             pipe.send(work(*pipe.recv()))

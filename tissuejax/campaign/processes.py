@@ -1,21 +1,19 @@
 """Processes of this machine. One that is killed takes its case with it; the pool is made anew and goes on."""
 
-import multiprocessing
-import os
-import threading
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, wait
 from concurrent.futures.process import BrokenProcessPool
 from typing import ClassVar
 
 from tissuejax.campaign.engine import Engine, Report, work
 from tissuejax.campaign.store import Store
 from tissuejax.campaign.task import Task
+from tissuejax.parent import pool
 
 AHEAD = 4  # tasks handed out per worker, so that none waits for the client
 
 
 class Processes(Engine):
-    """Spawned, as JAX does not survive a fork."""
+    """A pool of spawned processes."""
 
     name: ClassVar[str] = "processes"
 
@@ -30,14 +28,13 @@ class Processes(Engine):
 
     def _pool(self, store: Store, left: list[Task], workers: int, report: Report) -> bool:
         """Work until `left` is empty or a worker dies; what was not finished is put back."""
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, mp_context=context, initializer=leave_with_parent) as pool:
+        with pool(workers) as crew:
             out = {}
             while left or out:
                 try:
                     while left and len(out) < AHEAD * workers:
                         task = left.pop()
-                        out[pool.submit(work, str(store.folder), task.plain())] = task
+                        out[crew.submit(work, str(store.folder), task.plain())] = task
                     done, _ = wait(out, return_when=FIRST_COMPLETED)
                     for future in done:
                         task = out[future]
@@ -47,13 +44,6 @@ class Processes(Engine):
                     left.extend(out.values())
                     return True
         return False
-
-
-def leave_with_parent() -> None:
-    """End this process when its parent is gone: a killed client would leave it waiting for a next case for ever."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
 
 
 RETRIES = 2  # times a case is begun again within one run after its worker died

@@ -3,16 +3,16 @@
 import hashlib
 import json
 import os
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import replace
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 
 from tissuejax.challenge import cutting_cases, files, material_cases, rest_cases
 from tissuejax.errors import InputError, unknown
+from tissuejax.parent import pool
 from tissuejax.progress import Progress, Silent
 from tissuejax.storage import replacing, write_json
 
@@ -113,8 +113,8 @@ def _each(case, count: int, jobs: int):
     if jobs == 1:
         yield from map(case, range(count))
         return
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        for done in as_completed([pool.submit(case, i) for i in range(count)]):
+    with pool(jobs) as crew:
+        for done in as_completed([crew.submit(case, i) for i in range(count)]):
             yield done.result()
 
 

@@ -4,12 +4,12 @@ import os
 import shutil
 import time
 import traceback
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from concurrent.futures import as_completed
 from pathlib import Path
 
 from tissuejax.challenge import files
 from tissuejax.errors import InputError
+from tissuejax.parent import pool
 from tissuejax.progress import Progress, Silent
 from tissuejax.storage import write_json
 
@@ -58,8 +58,8 @@ def _each(folder: Path, cases: list[tuple[str, str]], jobs: int):
         for name, energy in cases:
             yield answer(folder, name, energy)
         return
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_one_core) as pool:
-        for done in as_completed([pool.submit(answer, folder, name, energy) for name, energy in cases]):
+    with pool(jobs, _one_core) as crew:
+        for done in as_completed([crew.submit(answer, folder, name, energy) for name, energy in cases]):
             yield done.result()
 
 

@@ -13,11 +13,13 @@ import signal
 import subprocess
 import sys
 import threading
+import traceback
 from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from queue import SimpleQueue
+from typing import Any, NoReturn
 
 import jax
 import jax.numpy as jnp
@@ -150,7 +152,8 @@ def run_all(jobs: Sequence[Job], processes: int, do: Callable = programs.run) ->
 def serve_pipe() -> None:
     """The worker's side: jobs from standard input, results to standard output; prints go to the error stream.
 
-    Ctrl-C reaches it too, and is the caller's business: what ends a worker is the end of its input.
+    Ctrl-C reaches it too, and is the caller's business: what ends a worker is the end of its input, which also comes
+    when the caller is killed, be a job under way or not.
     """
     from tissuejax.cache.programs import keep_programs
 
@@ -160,17 +163,28 @@ def serve_pipe() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
+    waiting: SimpleQueue[tuple[Callable, Job]] = SimpleQueue()
+    threading.Thread(target=_listen, args=(waiting,), daemon=True).start()
     while True:
-        try:
-            do, job = pickle.load(sys.stdin.buffer)
-        except EOFError:
-            return
+        do, job = waiting.get()
         try:
             reply = (True, jax.device_get(do(*job)))
         except Exception as error:
             reply = (False, error)
         pickle.dump(reply, answers)
         answers.flush()
+
+
+def _listen(waiting: SimpleQueue) -> NoReturn:
+    """Take in jobs; at their end leave at once."""
+    try:
+        while True:
+            waiting.put(pickle.load(sys.stdin.buffer))
+    except EOFError:
+        os._exit(0)
+    except BaseException:  # a job that can't be read: the caller sees the worker go, and does it
+        traceback.print_exc()
+        os._exit(1)
 
 
 if __name__ == "__main__":

@@ -4,10 +4,19 @@ from typing import ClassVar
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from tissuejax.diagnosis.judgement.judge import Kind
 from tissuejax.diagnosis.specimens import Specimens
 from tissuejax.report.plot import FAINT, HELD, INK, MODEL, Plot, grid
+
+ABREAST = 5  # entries of the key
+MARKS = {"found-in-part": "+", "ambiguous": "?", "unexplained": "x", "nothing-missing": "–"}
+ERRORS = {  # colour, and what the key says
+    "before_fitted": (FAINT, "base model, fitted"),
+    "after_fitted": (MODEL, "with the effects, fitted"),
+    "after_held_out": (HELD, "with the effects, held out"),
+}
 
 
 def attempted(record: dict) -> list[str]:
@@ -62,7 +71,9 @@ class DiagnosisSpecimens(Plot):
     def draw(self, data: dict) -> Figure:
         """Two panels sharing the specimens."""
         n = len(data["names"])
-        figure, (left, right) = grid(2, columns=2, height=max(2.4, 0.6 + 0.2 * n))
+        key = self.key(data)
+        rows = -(-len(key) // ABREAST)
+        figure, (left, right) = grid(2, columns=2, height=max(2.4, 0.6 + 0.2 * n) + 0.2 * rows)
         y = np.arange(n)[::-1]
         for j in range(len(data["effects"])):
             for i in range(n):
@@ -72,18 +83,12 @@ class DiagnosisSpecimens(Plot):
                     shade = max(1 - 0.3 * order, 0.25)
                     left.plot(j, y[i], "s", color=MODEL, markerfacecolor=inside, alpha=shade, markersize=7)
         for i, kind in enumerate(data["verdicts"]):
-            mark = {"found-in-part": "+", "ambiguous": "?", "unexplained": "x", "nothing-missing": "–"}.get(kind, "")
-            left.text(len(data["effects"]) - 0.4, y[i], mark, color=INK, fontsize=8, va="center")
+            left.text(len(data["effects"]) - 0.4, y[i], MARKS.get(kind, ""), color=INK, fontsize=8, va="center")
         left.set_xticks(range(len(data["effects"])), data["effects"], rotation=35, ha="right")
         left.set_xlim(-0.7, max(len(data["effects"]), 1) - 0.1)
         left.set_yticks(y, data["names"], fontsize=7)
-        for when, role, colour in (
-            ("before", "fitted", FAINT),
-            ("after", "fitted", MODEL),
-            ("after", "held_out", HELD),
-        ):
-            values = 100 * data[f"{when}_{role}"]
-            right.plot(values, y, "o", color=colour, markersize=4)
+        for errors, (colour, _) in ERRORS.items():
+            right.plot(100 * data[errors], y, "o", color=colour, markersize=4)
         right.set_xscale("log")
         low, high = right.get_xlim()
         ticks = [v for v in (0.05, 0.1, 0.2, 0.3, 0.5, 1, 2, 3, 5, 7, 10, 20, 30, 50) if low <= v <= high]
@@ -93,4 +98,21 @@ class DiagnosisSpecimens(Plot):
             ax.set_ylim(-0.7, n - 0.3)
         right.set_yticks(y, [])
         right.set_xlabel("RMSE over peak, %")
+        figure.legend(handles=key, loc="outside lower center", ncols=ABREAST, frameon=False, fontsize=8)
         return figure
+
+    def key(self, data: dict) -> list[Line2D]:
+        """One entry for each kind of mark that is drawn."""
+        kinds, tried = set(data["verdicts"]), np.isfinite(data["rank"]).any(axis=1)
+        open_ = np.array(data["verdicts"]) == "unexplained"
+        shown = {  # label: whether it is drawn, marker, colour, face
+            "effect found, the first darkest": ((tried & ~open_).any(), "s", MODEL, MODEL),
+            "best attempt, unexplained": ((tried & open_).any(), "s", MODEL, "none"),
+        }
+        shown |= {k.replace("-", " "): (k in kinds, f"${m}$", INK, INK) for k, m in MARKS.items()}
+        shown |= {label: (np.isfinite(data[e]).any(), "o", colour, colour) for e, (colour, label) in ERRORS.items()}
+        return [
+            Line2D([], [], linestyle="", marker=m, color=colour, markerfacecolor=face, markersize=5, label=label)
+            for label, (drawn, m, colour, face) in shown.items()
+            if drawn
+        ]

@@ -3,6 +3,7 @@
 import abc
 import os
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from typing import ClassVar
 
 from tissuejax.errors import InputError
@@ -14,7 +15,7 @@ from tissuejax.fitting.result import Fit
 from tissuejax.fitting.stress_curve import METHOD as STRESS_CURVE
 from tissuejax.fitting.stress_curve import fit_stress_curve
 from tissuejax.model import Model
-from tissuejax.progress import Progress, Silent
+from tissuejax.progress import Progress, Silent, Stage
 
 
 class Fitted(abc.ABC):
@@ -52,6 +53,12 @@ class Fitted(abc.ABC):
         """
 
 
+def begun(posed: Problem, progress: Progress | None) -> AbstractContextManager[Stage]:
+    """The stage of a fit, called by the energy and the sample."""
+    label = f"fitting {posed.predictor.model.energy.name} to {posed.predictor.sample.name}"
+    return (progress or Silent()).stage(label, None)
+
+
 class Quick(Fitted):
     """Kinds whose predictions are cheap beside a step: several starts, many steps."""
 
@@ -62,8 +69,7 @@ class Quick(Fitted):
         """See `Fitted.fit`."""
         if search.method == STRESS_CURVE:
             return fit_stress_curve(posed, holdout=held)  # says what it takes
-        label = f"fitting {posed.predictor.model.energy.name} to {posed.predictor.sample.name}"
-        with (progress or Silent()).stage(label, None) as stage:
+        with begun(posed, progress) as stage:
             return fit(
                 posed,
                 start={path: posed.start[path] for path in named} or None,

@@ -7,14 +7,14 @@ from typing import ClassVar
 from tissuejax.energies import catalogue
 from tissuejax.estimation.problem import Problem
 from tissuejax.fitting.first import First, first
-from tissuejax.fitting.kinds.fitted import Fitted
+from tissuejax.fitting.kinds.fitted import Fitted, begun
 from tissuejax.fitting.options import Search
 from tissuejax.fitting.probed import fit_probed
 from tissuejax.fitting.result import Fit
 from tissuejax.fitting.stress_curve import METHOD as STRESS_CURVE
 from tissuejax.fitting.stress_curve import fit_stress_curve
 from tissuejax.model import Model
-from tissuejax.progress import Progress, Silent
+from tissuejax.progress import Progress
 from tissuejax.surrogate import store
 
 JACOBIANS = 12  # at most, whatever the search allows: each costs several simulations
@@ -42,8 +42,7 @@ class Probings(Fitted):
         cls, posed: Problem, held: tuple[str, ...], search: Search, named: frozenset[str], progress: Progress | None
     ) -> Fit:
         """See `Fitted.fit`."""
-        label = f"fitting {posed.predictor.model.energy.name} to {posed.predictor.sample.name}"
-        with (progress or Silent()).stage(label, None):
+        with begun(posed, progress):
             if search.method == STRESS_CURVE:
                 return fit_stress_curve(posed, holdout=held)
             steps = min(search.max_steps, JACOBIANS)
