@@ -11,6 +11,7 @@ from tissuejax.estimation.ending import Ending
 from tissuejax.estimation.methods import broyden, marquardt, trust_region
 from tissuejax.estimation.posed import LeastSquares, half_square
 from tissuejax.estimation.reach import Reach, bounded
+from tissuejax.estimation.rules import CREEP, Precise, Proposal
 
 T = np.linspace(0, 3, 120)
 DATA = 2.0 * np.exp(-1.3 * T) + 0.01 * np.random.default_rng(3).normal(size=T.size)
@@ -172,6 +173,24 @@ def test_a_start_that_creeps_behind_another_is_given_up():
     assert alone.y == pytest.approx([1, 1], abs=1e-6)
     assert behind.ending is Ending.BEHIND
     assert behind.runs < 0.5 * alone.runs
+
+
+@pytest.mark.parametrize(("cost", "runs", "points", "given_up"), [
+    (50.0, CREEP, 30, False),  # a tenth and more below where it was half the watch ago
+    (54.1, CREEP, 30, True),
+    (54.1, CREEP - 10, 30, False),  # not watched yet
+    (0.001, CREEP, 30, False),  # below the other's
+    (54.1, CREEP, CREEP // 2 + 1, True),
+    (54.1, CREEP, CREEP // 2, False),  # no point so far back to compare with
+    (54.1, CREEP, CREEP // 3 - 1, True),  # few steps were taken at all
+])  # fmt: skip
+def test_a_creeping_start_is_told_by_what_half_the_watch_gained(cost, runs, points, given_up):
+    """60 then, and another start has come to 1: it has to have come below 54."""
+    trace = [(60.0, START)] * points
+    trace[-CREEP // 2 + 1 :] = [(cost, START)] * min(points, CREEP // 2 - 1)
+    step = Proposal(cost, 1.0, 1.0, 1.0, True, False, runs)
+    told = Precise(1e-9, runs=1000, to_beat=1.0).before(step, trace)
+    assert told is (Ending.BEHIND if given_up else None)
 
 
 def test_bounded_steps_are_those_of_scipy(rng):

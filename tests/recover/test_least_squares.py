@@ -1,5 +1,7 @@
 """The fitting room on a predictor in closed form: estimates, errors, intervals, methods, refusals."""
 
+import contextlib
+
 import numpy as np
 import pytest
 import scipy.optimize
@@ -9,6 +11,7 @@ from toy import ToyPredictor, curve, toy_sample
 from tissuejax.errors import InputError, NotConverged
 from tissuejax.estimation.problem import Problem
 from tissuejax.estimation.weights import noise
+from tissuejax.fitting import serial as serial_module
 from tissuejax.fitting.advice import mean_factor
 from tissuejax.fitting.least_squares import descend, fit, required
 from tissuejax.fitting.options import Search
@@ -128,6 +131,31 @@ def test_what_is_said_of_correlated_residuals_is_what_was_done(rng):
     assert f"{times:.1f} times larger" in said
     assert 2 < times < 19**0.5
     assert mean_factor(0.6) == pytest.approx(2.0)  # (1 + 0.6) / (1 - 0.6) = 4
+
+
+@pytest.mark.parametrize(("times", "sought"), [(0.98, False), (1.02, True), (-1.5, False)])
+def test_the_shape_of_the_noise_is_sought_where_neighbours_agree_beyond_chance(rng, monkeypatch, times, sought):
+    """From 2.5 standard deviations of the correlation of neighbours on, 1 / sqrt(n) each; not where it is negative."""
+
+    class Sought(Exception):
+        pass
+
+    def estimate(*args, **options):
+        raise Sought
+
+    monkeypatch.setattr(serial_module, "estimate", estimate)
+    n, white = 150, rng.normal(size=(2, 150))
+
+    def neighbours(share):
+        r = white[0] + share * np.roll(white[0], 1)
+        r = r - r.mean()
+        return r, r[1:] @ r[:-1] / (r @ r)
+
+    share = scipy.optimize.brentq(lambda s: neighbours(s)[1] - times * 2.5 / np.sqrt(n), -0.99, 0.99)
+    posed = problem(toy_sample(rng, TRUE, n=n, names=("r1",)))
+    r = 3.0 * neighbours(share)[0] + 7.0  # a mean is not a correlation
+    with pytest.raises(Sought) if sought else contextlib.nullcontext():
+        assert serial_module.serial(posed, r).parts == ()
 
 
 def test_noise_stated_too_large_is_said(rng):

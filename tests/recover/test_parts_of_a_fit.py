@@ -12,6 +12,7 @@ import scipy.optimize
 import scipy.stats
 from toy import ToyModel, ToyPredictor, toy_sample
 
+from tissuejax.errors import InputError
 from tissuejax.estimation.losses import soften
 from tissuejax.estimation.numerical import changes
 from tissuejax.estimation.problem import Problem
@@ -77,6 +78,25 @@ def test_the_profile_of_a_linear_parameter_is_a_parabola_at_even_steps(rng):
     np.testing.assert_allclose((got.values - best) / std, np.arange(-6, 7) / 2, atol=1e-9)
     np.testing.assert_allclose(got.rise, ((got.values - best) / std) ** 2, atol=1e-6)
     assert got.interval == pytest.approx((best - 1.95996 * std, best + 1.95996 * std), rel=1e-4)
+
+
+@pytest.mark.parametrize(("times", "own"), [(0.95, True), (1.05, False)])
+def test_a_scan_goes_by_the_standard_error_up_to_ten_times_the_size(rng, times, own):
+    """Ten times scale and estimate together (10 and 5 Pa); beyond that by the larger of the two, on and on while flat:
+    three times as far."""
+    level = float(times * 10 * (10.0 + 5.0) * np.sqrt(800))
+    sample = toy_sample(rng, TRUE, noise=0.0)
+    off = rng.normal(size=800)
+    off = level * (off - off.mean()) / off.std()  # estimated is the true offset
+    for k, (name, r) in enumerate(sample.recordings.items()):
+        c = r.channels["nominal_stress"]
+        c = Channel(c.time, c.values + off[400 * k : 400 * k + 400], "Pa", level)
+        sample.recordings[name] = Recording(name, "toy", r.inputs, {"nominal_stress": c}, {})
+    found = fit(problem(sample, ("energy.offset",)), search=Search(multistart=1))
+    assert found.std["energy.offset"] == pytest.approx(times * 150.0, rel=1e-6)
+    got = profile(found, "energy.offset", reach=3.0, points=6)
+    steps = np.arange(-6, 7) * found.std["energy.offset"] / 2 if own else np.arange(-18, 19) * 5.0
+    np.testing.assert_allclose(got.values, 5.0 + steps, atol=1e-3)
 
 
 def test_what_numerical_choices_leave_open_is_the_distance_to_the_limit():
@@ -171,8 +191,8 @@ def test_numbers_in_the_sentences_on_a_cut_s_resolution():
     (both,) = [s for s in said if "no strength suits both" in s]
     assert f"at least {2 * G / b:.4g} Pa" in both
     plane = 4 * 1564.0 * (2e4 + 1564.0 / 3) / (2e4 + 4 * 1564.0 / 3)
-    size = float(both.split("elements of ")[1].split(" mm")[0]) * 1e-3
-    assert np.sqrt(9 * np.pi * plane * G / (32 * 3 * size)) == pytest.approx(2 * G / b, rel=5e-3)
+    size = 9 * np.pi * plane * G / (32 * 3 * (2 * G / b) ** 2)
+    assert f"elements of {1e3 * size:.3g} mm are needed" in both
     thin = resolution(4000.0, G, 1564.0, 2e4, b, 1e-5, 0.02, 0.005).sentences
     assert any(f"A strength above {2 * G / b:.4g} Pa parts it" in s for s in thin)
 
@@ -239,6 +259,18 @@ def test_moduli_to_begin_with_are_the_non_negative_least_squares(rng):
         assert found["energy.rate"] == rate
         zeros.append(int(np.sum(solved == 0)))
     assert zeros == [0, 1]
+
+
+@pytest.mark.parametrize("begun", [-2.0, 0.0, 2.0])
+def test_a_modulus_that_is_not_asked_for_keeps_the_sign_of_its_start(rng, begun):
+    """Data without offset: a thousandth of them on the side where it began, and nothing where it began at nothing."""
+    p = problem(toy_sample(rng, TRUE | {"energy.offset": 0.0}, n=40, noise=0.0), ("energy.a", "energy.offset"))
+    channels = [r.channels["nominal_stress"] for r in p.predictor.sample.recordings.values()]
+    data = np.concatenate([c.values - TRUE["energy.b"] * np.exp(-2.1 * c.time) for c in channels])
+    found = fitted_moduli(p, p.start | {"energy.a": 1.0, "energy.offset": begun})
+    least = LEAST * np.sqrt(np.mean(data**2))
+    assert found["energy.offset"] == pytest.approx(np.sign(begun) * least, rel=1e-6, abs=1e-9 * least)
+    assert found["energy.a"] == pytest.approx(TRUE["energy.a"], rel=1e-6)
 
 
 def test_further_starts_vary_by_what_is_stated(rng):
@@ -338,6 +370,13 @@ def test_sobol_indices_of_a_product_are_those_by_hand(rng):
     whole = first + both.sum() / total * np.array([1, 1, 0])
     np.testing.assert_allclose(found.total["r1/nominal_stress"], whole, atol=0.03)
     assert (found.n, found.failed) == (5 * 1024, 0.0)
+
+
+@pytest.mark.parametrize("n", [0, 1, 3, 96])
+def test_sobol_draws_that_are_no_power_of_two_are_refused(rng, n):
+    ranges = {"energy.a": (50.0, 150.0), "energy.rate": (0.2, 1.0)}
+    with pytest.raises(InputError, match=f"n = {n}: it must be a power of two"):
+        sobol(ToyPredictor(toy_sample(rng, TRUE, n=5)), TRUE, ranges, n=n)
 
 
 def test_sobol_indices_are_the_same_in_batches_and_one_by_one(rng, monkeypatch):

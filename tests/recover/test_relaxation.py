@@ -9,10 +9,12 @@ import tissuejax as tj
 from tissuejax.effects.catalogue import effect
 from tissuejax.errors import InputError
 from tissuejax.estimation.transforms import Box, Sticks, chained, unchained
+from tissuejax.estimation.weights import Weights
 from tissuejax.experiments.predictor import predictor
 from tissuejax.fitting.idle import merged, roused, woken
 from tissuejax.fitting.idle import terms as idle_terms
 from tissuejax.fitting.least_squares import descend
+from tissuejax.fitting.memory import begun_loaded
 from tissuejax.fitting.options import Unknowns
 from tissuejax.fitting.setup import problem, split
 from tissuejax.fitting.starts import fitted_moduli, neutral
@@ -165,6 +167,16 @@ def test_a_recording_cut_out_of_a_longer_one_is_told_so():
     assert not any("begins under load" in w for w in elastic.warnings)
 
 
+@pytest.mark.parametrize(("first", "said"), [((1.0, 1.15), "1.15"), ((1.1, 1.05), "1.1"), ((1.05, 0.9), "0.9")])
+def test_a_recording_cut_out_says_the_stretch_of_the_axis_that_is_farthest_from_rest(first, said):
+    time = np.linspace(0, 10, 41)
+    drive = np.stack([np.interp(time, [0, 5, 10], [at, 1.3, 1.3]) for at in first], 1)
+    channel = Channel(time, 1e3 * (drive - 1), "Pa", 5.0)
+    made = Recording("r", "biaxial", {"time": time, "stretch": drive}, {"nominal_stress": channel}, {})
+    (told,) = begun_loaded({"r": made}, ["r"], Weights({"r/nominal_stress": 5.0}))
+    assert told.startswith(f"r (stretch {said}) begins under load")
+
+
 @pytest.mark.parametrize(
     ("name", "terms"),
     [("viscoelasticity", 1), ("viscoelasticity-2", 2), ("viscoelasticity-1", 1), ("viscoelasticity-5", 5)],
@@ -195,6 +207,20 @@ def test_parts_of_a_whole_against_differences(rng):
         assert parts[:3].sum() < 0.8
     crowded = box.bounded(box.free(np.array([0.6, 0.6, 0.6, 0.0])))[0]
     assert crowded[:3].sum() < 0.8
+
+
+def test_every_kind_of_bound_has_its_formula_and_its_slope():
+    """Both, lower, upper, none, none over decades; differences tell of the slope, also far from rest."""
+    inf, scale = np.inf, np.array([0.5, 2.0, 3.0, 4.0, 5.0])
+    box = Box([-1, -2, -inf, -inf, -inf], [7, inf, 6, inf, inf], list(scale), wide=[False] * 4 + [True])
+    for at in (-3.0, -0.4, 0.0, 1.1, 2.5):
+        y, grown = np.full(5, at), np.log1p(np.exp([at, -at]))
+        x, slope = box.bounded(y)
+        formula = [-1 + 8 / (1 + np.exp(-at)), -2 + 2 * grown[0], 6 - 3 * grown[1], 4 * at, 5e-3 * np.sinh(at)]
+        np.testing.assert_allclose(x, formula, rtol=1e-12)
+        np.testing.assert_allclose(box.free(x), y, atol=1e-9)
+        numeric = (box.bounded(y + 1e-5)[0] - box.bounded(y - 1e-5)[0]) / 2e-5
+        np.testing.assert_allclose(slope, numeric, rtol=1e-7)
 
 
 def test_an_idle_term_wakes_where_it_is_needed():

@@ -56,3 +56,16 @@ def test_plain_elements_do_so_only_where_they_are_cubes():
     """As is said where a mesh is made (`mesh.columns`): far too stiff where they are five times as long as high."""
     assert sag(None, 10, 0.3) == pytest.approx(0.96, abs=0.05)
     assert sag(None, 2, 0.3) < 0.5
+
+
+@pytest.mark.parametrize(("true", "chosen"), [(0.0, 0.0), (0.3, 0.3), (0.453, 0.45), (0.4996, 0.5), (-0.2, 0.0)])
+def test_poisson_s_ratio_in_bending_is_chosen_by_the_moduli(true, chosen):
+    """K = 2 mu (1 + nu) / (3 (1 - 2 nu)), solved to two digits; none below 0."""
+    bulk = 2 * MU * (1 + true) / (3 * (1 - 2 * true))
+    made = build.scene(
+        box((HEIGHT, HEIGHT, HEIGHT), (1, 1, 1)),
+        build.Tissue(ReducedPolynomial(order=1), Quadratic(), dict(C10=MU / 2), dict(K=bulk), 1000.0),
+        np.arange(2.0) * 1e-3,
+        numerics=build.Numerics(element="hexahedron-bending"),
+    )
+    assert made.body.element.poisson == chosen

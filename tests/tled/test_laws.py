@@ -216,7 +216,7 @@ def test_the_energy_of_contact_has_no_jump(kind, rounding):
 def test_friction_slides_at_its_limit_and_sticks_below(give, by_c, monkeypatch):
     """A platen pressed on and dragged across a block that is held all round: |drag| = mu x push once it slides, and the
     stiffness of the penalty's spring and of what gives, in series, times the way before. Both are even over the face:
-    the torque is that of one force at its middle."""
+    the torque is that of one force at its middle, the energy in the springs that of one spring."""
     if not by_c:
         monkeypatch.setattr(native, "wanted", lambda: False)
     scene, probe, patch = under_a_flat_face("hexes")
@@ -227,12 +227,15 @@ def test_friction_slides_at_its_limit_and_sticks_below(give, by_c, monkeypatch):
     above = jnp.asarray(aside + [0, 0, 1e-5])
     grip = contact.forces(probe, patch, u, above, contact.untouched(probe)).grip
     push = 1e8 * 1e-5 * AREA
-    for way, drag in ((1e-6, 1e-6 / (1e-8 + give) * AREA), (2.6 * (1e-6 + 100 * give), 0.25 * push)):
+    spring = 1 / (1e-8 + give)
+    for way, drag in ((1e-6, 1e-6 * spring * AREA), (2.6 * (1e-6 + 100 * give), 0.25 * push)):
         at = aside + [way, 0, -1e-5]
         felt = contact.forces(probe, patch, u, jnp.asarray(at), grip)
         assert float(felt.force[2]) == pytest.approx(push, rel=1e-6)
         assert float(felt.force[0]) == pytest.approx(-drag, rel=1e-6)
         np.testing.assert_allclose(felt.torque, np.cross(middle - at, felt.force), rtol=1e-9)
+        held = contact.gripped(probe, patch, u, jnp.asarray(at), grip)  # in the springs: force squared over 2 k
+        assert float(held) == pytest.approx(drag**2 / (2 * spring * AREA), rel=1e-6)
 
 
 def test_a_platen_off_centre_feels_the_torque_of_its_force():

@@ -3,6 +3,7 @@
 from xml.etree import ElementTree
 
 import h5py
+import jax
 import jax.numpy as jnp
 import meshio
 import numpy as np
@@ -11,9 +12,11 @@ import pytest
 from tests.tled import cases
 from tissuejax.errors import InputError, UnstableSimulation
 from tissuejax.mesh.columns import box
-from tissuejax.tled import contact, internal, ledger, stable, stream
+from tissuejax.recordings.recording import Geometry
+from tissuejax.tled import build, contact, internal, ledger, stable, stream
 from tissuejax.tled.build import ProbePath
-from tissuejax.tled.simulate import compiled, run
+from tissuejax.tled.shapes import Platen
+from tissuejax.tled.simulate import compiled, run, simulate
 from tissuejax.tled.step import machine
 
 FRAMES = 36  # a square: no frames beyond the last are run
@@ -159,3 +162,58 @@ def test_a_run_that_is_stopped_goes_on_bit_for_bit(tmp_path):
         for item in tree.iter("DataItem"):
             assert file[item.text.split(":")[1]].shape == tuple(map(int, item.get("Dimensions").split()))
     assert [float(t.get("Value")) for t in tree.iter("Time")] == pytest.approx([0.5 / 3, 1.0 / 3, 0.5])
+
+
+STIFF, SINKS, START = 1e8, 0.05, 1e-5  # Pa/m, m/s, m above the face
+BLOCK = (0.02, 0.016, 0.012)
+quick = jax.jit(simulate, compiler_options={"xla_backend_optimization_level": "0"})  # compiled for one use
+
+
+@pytest.fixture(scope="module")
+def rigid():
+    """A platen that goes down evenly into a block all of whose nodes are held; four frames, two to a block."""
+    g = box(BLOCK, (3, 2, 2))
+    g = Geometry(g.points, g.cells, g.cell_type, np.arange(len(g.points)))
+    bare = cases.plain(g, (np.arange(4) + 0.5) * 0.01, compression=4.0).put({"clock.steps": 6})
+    time = np.array([-1.0, 1.0])
+    path = np.array([[0.0, 0.0, BLOCK[2] + START - SINKS * t] for t in time])
+    top = np.asarray(bare.body.facets)
+    top = top[np.isclose(g.points[top][:, :, 2], BLOCK[2]).all(1)]
+    probe = build.probe(bare, Platen(), time, path, top, STIFF, 1e-8)
+    corner = int(np.argmax(g.points @ [1.0, 1.0, -1.0]))  # away from the platen, of one element alone
+    return corner, bare.put(
+        {
+            "probe": probe, "probe.compliance": jnp.asarray(0.0),
+            "support.time": jnp.array([0.0, 0.0105, 0.02]), "support.displacement": jnp.zeros((3, 3)),
+            "support.pattern": jnp.zeros((len(g.points), 3)).at[corner, 2].set(1.0),
+        }
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("give", [0.0, 0.64, 3.0])
+def test_a_rigid_block_is_penetrated_as_far_as_the_machine_does_not_give_way(rigid, give):
+    """Depth d of the path, contact stiffness k = penalty x area, machine C: k (d - C F) = F, so it goes in by
+    d / (1 + C k): at the end of a frame, to the last step's motion. A stiff machine's force is k d at the force's own
+    time: the mean over the starts of its steps; its work k d^2 / 2, half a step before the end."""
+    _, scene = rigid
+    k = STIFF * BLOCK[0] * BLOCK[1]
+    out = quick(scene.put({"probe.compliance": jnp.asarray(give / k)}))
+    deep = lambda t: (SINKS * np.asarray(t) - START)[1:]  # noqa: E731  it touches in the first frame
+    last = float(scene.clock.interval) / scene.clock.steps
+    found = np.asarray(out.penetration)[1:] * (1 + give)
+    assert (found >= deep(out.end_time - last) * (1 - 1e-9)).all()
+    assert (found <= deep(out.end_time) * (1 + 1e-9)).all()
+    if not give:
+        np.testing.assert_allclose(out.force[1:, 2], k * deep(out.time), rtol=1e-9)
+        stored = 0.5 * k * deep(out.end_time - 0.5 * last) ** 2
+        np.testing.assert_allclose(np.diff(out.work[1:]), np.diff(stored), rtol=1e-9)
+
+
+def test_a_burst_in_the_last_frame_before_a_look_is_put_where_it_began(rigid):
+    """One corner of a rigid block is moved, and torn off in the second of two frames between looks: the element named
+    has that corner, none of the others is wrong."""
+    corner, scene = rigid
+    torn = jnp.array([[0.0] * 3, [0.0, 0.0, -1e-5], [0.0, 0.0, -1e307]])  # its speed overflows
+    out = quick(scene.put({"support.displacement": torn}))
+    assert int(out.failed) == 1
+    assert corner in scene.body.cells[int(out.element)]

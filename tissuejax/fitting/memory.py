@@ -73,7 +73,8 @@ def begun_loaded(recordings: Mapping[str, Recording], names: Sequence[str], nois
         away = np.max(np.abs(drive[:FIRST] - rest), axis=1) > REST * np.max(np.abs(drive - rest))
         still = int(np.argmax(away)) if away.any() else FIRST  # samples before anything is done
         if still == 0:
-            said.append(f"{name} ({kind} {drive[0, 0]:.4g})")
+            axis = int(np.argmax(np.abs(drive[0] - rest)))
+            said.append(f"{name} ({kind} {drive[0, axis]:.4g})")
             continue
         first = float(np.max(np.abs(np.mean(stress[:still], axis=0))))
         level = noise.std.get(f"{name}/nominal_stress", 0.0)
