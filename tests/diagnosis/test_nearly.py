@@ -139,3 +139,22 @@ def test_a_relaxation_that_is_over_at_once_does_nothing_and_has_nothing_wrong_wi
     across = gone - here * (gone @ here) / (here @ here)
     assert errs == pytest.approx(np.linalg.norm(across), rel=1e-3, abs=1e-4 * np.linalg.norm(gone))
     assert least <= errs / np.linalg.norm(gone) < most
+
+
+def test_a_law_errs_by_nothing_that_its_own_constants_could_do():
+    """In units of each block's noise its part lies across the slopes in all that the set frees, and is a projection of
+    the part without them: what is left, and what the slopes do of it, add up to it."""
+    scales = relaxed(np.linspace(0.05, 20, 60))
+    bench, key = scales.bench, "viscoelasticity/one time"
+    values = {**{p: bench.start[p] for p in bench.base}, "effects.viscoelasticity.g1": 0.5}
+    values["effects.viscoelasticity.tau1"] = 3.0
+    slopes = scales.cut.mean(bench.jacobian(values, tuple(values), bench.fitted))
+    prediction, noise = bench.predict(values), scales.blocked.sigma[:, None]
+    (whole,), (across,) = (
+        [p.factor / noise for p in scales.about(prediction, bench, [key], values, given) if p.family == "effect"]
+        for given in (None, slopes)
+    )
+    light = slopes / noise
+    taken = light @ np.linalg.lstsq(light, whole, rcond=None)[0]  # by other algebra than the code's
+    np.testing.assert_allclose(across, whole - taken, atol=1e-6 * np.max(np.abs(whole)))
+    assert 0.05 < np.linalg.norm(across) / np.linalg.norm(whole) < 0.9  # some of both

@@ -53,15 +53,19 @@ class Scales:
         bench: Bench,
         keys: Sequence[str] = (),
         values: Mapping[str, float] = MappingProxyType({}),
+        slopes: Float[np.ndarray, "M p"] | None = None,
     ) -> tuple[Part, ...]:
         """The discrepancy's parts beside a prediction (a long vector), and what the simulation has wrong there.
 
         Args:
             keys: effects in the prediction, at `values`; what their laws err by is a part where that is known.
+            slopes: of the prediction, in what the set frees: no law errs by what its own constants could do.
         """
         here = np.nan_to_num(self.cut.mean(prediction))
         done = self._done(here, bench, keys, values) if "effect" in self.families else []
         parts = self.discrepancy.about(here, done) if done else self.discrepancy.about(here)
+        if done and slopes is not None:
+            parts = tuple(self._across(p, slopes) if p.family == "effect" else p for p in parts)
         if bench.numerical is None:
             return parts
         return (*parts, *(self._known(name, self.cut.mean(x)) for name, x in bench.numerical.items()))
@@ -91,13 +95,14 @@ class Scales:
 
     def _base(self, bench: Bench, values: Mapping[str, float]) -> Float[np.ndarray, "M p"]:
         """An orthonormal basis of what the base's constants can do about `values`."""
-        slopes = np.nan_to_num(self.cut.mean(bench.jacobian(values, bench.base, bench.fitted)))
-        sizes = np.linalg.norm(slopes, axis=0)
-        felt = sizes > 0
-        if not felt.any():
-            return np.zeros((len(slopes), 0))
-        turned, size, _ = np.linalg.svd(slopes[:, felt] / sizes[felt], full_matrices=False)
-        return turned[:, size > SINGULAR * size[0]]
+        return _span(np.nan_to_num(self.cut.mean(bench.jacobian(values, bench.base, bench.fitted))))
+
+    def _across(self, part: Part, slopes: Float[np.ndarray, "M p"]) -> Part:
+        """Of this part what lies across the slopes, each block in units of its noise (Plumlee 2017, JASA 112)."""
+        sigma = self.blocked.sigma[:, None]
+        basis = _span(np.nan_to_num(slopes) / sigma)
+        light = part.factor / sigma
+        return replace(part, factor=sigma * (light - basis @ (basis.T @ light)))
 
     def _known(self, name: str, error: Float[np.ndarray, "M ..."]) -> Part:
         """A known error of a simulation: by columns, or where its sign is not known of each block alone."""
@@ -150,6 +155,16 @@ class Scales:
                 if 0 < moved < math.inf and stress > 0:
                     out[a] = criteria.usual(candidate.rig) * math.sqrt(stress / moved)
         return {a: out.get(a, self.bench.free[a].scale) for a in candidate.amplitudes}
+
+
+def _span(slopes: Float[np.ndarray, "M p"]) -> Float[np.ndarray, "M q"]:
+    """An orthonormal basis of what these slopes do, directions that are rounding left out."""
+    sizes = np.linalg.norm(slopes, axis=0)
+    felt = sizes > 0
+    if not felt.any():
+        return np.zeros((len(slopes), 0))
+    turned, size, _ = np.linalg.svd(slopes[:, felt] / sizes[felt], full_matrices=False)
+    return turned[:, size > SINGULAR * size[0]]
 
 
 def scaled(

@@ -130,8 +130,10 @@ def weigh(
     at, tolerance, raw = dict(at or start), 0.5, None
     bench = bench.anchored(at) if anchor else bench.nearer(at)
     parts = scales.about(bench.predict(at), bench, keys, at)
-    for _turn in range(rounds):
-        misfit = Whitening(bench, scales.cut, scales.blocked, parts, v)
+    # what laws of effects err by lies across the slopes at a fit, and before the first there are none
+    exact = np.where([f == "effect" for f in scales.families], 0.0, v)
+    for turn in range(rounds):
+        misfit = Whitening(bench, scales.cut, scales.blocked, parts, v if turn else exact)
         seed = None if raw is None or bench.costly else misfit.whiten_means(raw)
         fit = refit(bench, misfit, keys, at, iterations=iterations, tolerance=tolerance, errors=False, seed=seed)
         if not np.isfinite(fit.chi2):
@@ -150,7 +152,8 @@ def weigh(
         jac = raw * np.where(descent.log, [fit.values[p] for p in descent.paths], 1.0)
         if not np.isfinite(squared(jac / scales.blocked.sigma[:, None])):
             break  # a prediction without a slope, or with one beyond all numbers: no density is to be had there
-        residual, parts = y - scales.cut.mean(fit.prediction), scales.about(fit.prediction, bench, keys, fit.values)
+        residual = y - scales.cut.mean(fit.prediction)
+        parts = scales.about(fit.prediction, bench, keys, fit.values, raw[:, ~bound])
         prior = [priors.get(p) for p in descent.paths]
         weak = np.array([0.0 if p is None else p[1] ** -2 for p in prior])
         offset = np.array([0.0 if p is None else a - p[0] for a, p in zip(x, prior, strict=True)])
