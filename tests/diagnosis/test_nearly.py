@@ -7,6 +7,7 @@ import tissuejax as tj
 from tissuejax.diagnosis.judgement.blocks import blocks, series
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, marginal
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
+from tissuejax.diagnosis.judgement.rest import beyond
 from tissuejax.diagnosis.judgement.scales import Scales, scaled
 from tissuejax.diagnosis.material import MaterialBench, strain_states
 from tissuejax.energies.neo_hookean import NeoHookean
@@ -158,3 +159,15 @@ def test_a_law_errs_by_nothing_that_its_own_constants_could_do():
     taken = light @ np.linalg.lstsq(light, whole, rcond=None)[0]  # by other algebra than the code's
     np.testing.assert_allclose(across, whole - taken, atol=1e-6 * np.max(np.abs(whole)))
     assert 0.05 < np.linalg.norm(across) / np.linalg.norm(whole) < 0.9  # some of both
+
+
+def test_what_the_constants_of_a_set_could_take_up_is_no_rest(rng):
+    """A rest made of something that the slopes do and of something across them: only the second is one."""
+    scales = relaxed(np.linspace(0.05, 20, 60))
+    n = len(scales.blocked.sigma)
+    apart = np.linalg.qr(rng.standard_normal((n, 3)))[0]
+    slopes, across = apart[:, :2] @ np.array([[1.0, 0.0], [2.0, 3.0]]), apart[:, 2]
+    linear = Linear(np.zeros(n), slopes, np.zeros(2), np.zeros(2))
+    left, wide = beyond(scales, linear, slopes @ np.array([30.0, -7.0]) + across, np.full(n, 4.0))
+    np.testing.assert_allclose(left, across / scales.peak, atol=1e-12)
+    np.testing.assert_allclose(wide, 4.0 / scales.peak**2)

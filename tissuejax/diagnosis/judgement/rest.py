@@ -15,14 +15,15 @@ if TYPE_CHECKING:
 
 
 def beyond(scales: "Scales", linear: Linear, smoothed: np.ndarray, scatter: np.ndarray) -> tuple[np.ndarray, ...]:
-    """The rest and its variance over the size; of a simulation, what its parameters could not take up as well.
+    """The rest and its variance over the size, without what the set's own parameters could take up as well.
 
-    Few recordings of a simulation with a wide law hold neither parameters nor law along what they share.
+    Under the discrepancy parameters may settle off the place that is nearest to the recordings; what lies between is no
+    rest: the fit that is shown takes it up. And few recordings of a simulation with a wide law hold neither parameters
+    nor law along what they share.
     """
-    if scales.size is None:
-        return smoothed / scales.peak, scatter / scales.peak**2
-    left, slopes = smoothed / scales.size, linear.jacobian / scales.size[:, None]
-    return left - slopes @ np.linalg.lstsq(slopes, left, rcond=None)[0], scatter / scales.size**2
+    size = np.full(len(smoothed), scales.peak) if scales.size is None else scales.size
+    left, slopes = smoothed / size, linear.jacobian / size[:, None]
+    return left - slopes @ np.linalg.lstsq(slopes, left, rcond=None)[0], scatter / size**2
 
 
 def rest(
