@@ -82,4 +82,4 @@ def tables(answers: list[Answer], found: dict) -> str:
 
 def counted(words: list[str]) -> str:
     """How often each occurs, most frequent first."""
-    return ", ".join(f"{w} {words.count(w)}" for w in sorted(set(words), key=lambda w: -words.count(w)))
+    return ", ".join(f"{w} {words.count(w)}" for w in sorted(set(words), key=lambda w: (-words.count(w), w)))
