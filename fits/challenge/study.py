@@ -17,9 +17,9 @@ BEGIN, END = "<!-- pooled: written by the study -->", "<!-- end of pooled -->"
 CURRENT = {
     "material": ("material", "material-second", "material-third", "material-fourth", "material-fifth",
                  "material-sixth", "material-seventh", "material-eighth", "material-ninth",
-                 "material-tenth", "material-eleventh"),
+                 "material-tenth", "material-eleventh", "material-twelfth"),
     "probing": ("probing", "probing-strong", "probing-strong-second", "probing-pairs", "probing-second",
-                "probing-strong-third", "probing-third", "probing-fourth"),
+                "probing-strong-third", "probing-third", "probing-fourth", "probing-fifth"),
 }  # fmt: skip
 
 
