@@ -1,5 +1,6 @@
 """A blade through a slab: steady force, fracture energy and the energy balance against closed forms."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -47,6 +48,21 @@ def test_energy_lost_per_area_is_the_toughness(half_millimetre):
     front, area = np.asarray(out.balance.front), np.asarray(out.balance.area) / 5e-4
     assert front[-1] == pytest.approx(area[-1], abs=2.6e-4)
     assert (np.diff(front[np.isfinite(front)]) >= 0).all()
+
+
+def test_work_is_accounted_for_where_the_tissue_is_carried_onto_a_blade_at_rest():
+    """Damping is relative to the support's pace: a body that is only carried along loses nothing, and the blade, at
+    rest, does no work. With what damping takes from the whole speed a quarter of the work was laid to it."""
+    scene = cut(h=1e-3, frames=40)
+    time = np.linspace(0, float(scene.probe.time[-1]), 401)
+    share = time / time[-1]
+    way = np.zeros((401, 3))
+    way[:, 0] = -0.014 * share**2 * (3 - 2 * share)
+    tip = np.repeat(np.asarray(scene.probe.position)[:1], len(scene.probe.time), axis=0)
+    moved = {"support.time": time, "support.displacement": way, "probe.position": tip}
+    out = run(scene.put({path: jnp.asarray(x) for path, x in moved.items()}))
+    assert np.abs(np.asarray(out.balance.work)).max() == 0
+    assert np.abs(np.asarray(out.balance.error))[20:].max() < 0.0005
 
 
 def test_friction_adds_what_it_loses():

@@ -242,7 +242,7 @@ def _depth(frozen: tuple[Machine, State], drive: Drive) -> Float[Array, ""]:
     m, state = frozen
     if drive.centre is None:
         return jnp.asarray(-jnp.inf, state.u.dtype)
-    centre = jax.lax.stop_gradient(drive.centre[-1])
+    centre = jax.lax.stop_gradient(drive.centre[-1] + filled(drive.stride)[-1])  # at the end of the last step
     probe = m.scene.pressed
     centre = centre if state.felt is None else centre + filled(probe.compliance) * state.felt[0]
     return contact.depth(probe, filled(m.patch), state.u, centre)

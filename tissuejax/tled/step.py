@@ -173,16 +173,20 @@ def advance(m: Machine, state: State, drive: Drive) -> tuple[State, Felt]:
     pushed = jnp.where(m.hold.held, (moved - u) / h, pushed)
     moved, pushed = barrier((moved, pushed))
     reaction = jnp.sum(scene.body.held.T * f[:, scene.body.fixed], axis=1)  # force of the tissue on the support
-    spent = None if scene.faces is None else _spent(m, filled(acting), inner, f, v, pushed)
+    spent = None if scene.faces is None else _spent(m, filled(acting), inner, f, v, pushed, drive.pace)
     return State(moved, pushed, history, grip, slip, felt, opening), Felt(force, torque, reaction, work, spent)
 
 
-def _spent(m: Machine, acting: surface.Acting, inner, f, v, pushed) -> Spent:
-    """Losses and works of one step, J, at the mean of the speeds before and after, point by point or node by node."""
+def _spent(m: Machine, acting: surface.Acting, inner, f, v, pushed, pace) -> Spent:
+    """Losses and works of one step, J, at the mean of the speeds before and after, point by point or node by node.
+
+    Damping is what it takes out of the body's motion, less what the support's pace, which it is relative to, puts in.
+    """
     scene, zero = m.scene, jnp.zeros(1, v.dtype)
     h, mean = scene.clock.step, 0.5 * (v + pushed)
     free = jnp.where(m.hold.held, 0.0, mean)
-    damping = scene.settings.mass_damping * h * m.mass * jnp.sum(free * free, 0)
+    slowed = free if pace is None else free - pace[:, None]
+    damping = scene.settings.mass_damping * h * m.mass * jnp.sum(free * slowed, 0)
     shove = zero
     if scene.support.displacement is not None:
         shove = jnp.sum(jnp.where(m.hold.held, mean * (m.mass * (pushed - v) - h * f), 0.0), 0)
