@@ -9,7 +9,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from tissuejax.cache import source
+
+sys.path.insert(0, str(source.ROOT.parent))
 
 from tests.cutting.oracles import layer_stress, steady_force
 from tests.cutting.slabs import BULK, MU, cut, pulled

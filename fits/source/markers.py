@@ -5,10 +5,10 @@ Ex vivo law, each turn of the stress curve, and the fit by gradients that the st
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
+from tissuejax.cache import source
 from tissuejax.energies.catalogue import volumetric
 from tissuejax.energies.published import published
 from tissuejax.experiments.predictor import predictor
@@ -27,7 +27,7 @@ class Quiet:
         return np.full(shape, mean)
 
 
-def site(folder: Path, study: dict, name: str) -> dict:
+def site(study: dict, name: str) -> dict:
     """Errors of each law that could be simulated, beside the truth without noise and beside the recording."""
     quiet = study["measured"](study["lobe"](), name, Quiet())
     was, rng = quiet.recordings[name], np.random.default_rng([2012, list(study["SITES"]).index(name)])
@@ -36,7 +36,7 @@ def site(folder: Path, study: dict, name: str) -> dict:
     start = {f"energy.{k}": float(v) for k, v in entry.constants.items()} | {"volumetric.K": study["K"]}
     p = predictor(Model(entry.energy, volumetric("quadratic")), sample, settings=study["FIT"])
     _, turns = stress_curve(p, name, start)
-    kept = json.loads((folder.parent / "in-vivo-liver" / "result.json").read_text())[name]
+    kept = json.loads((source.ROOT.parent / "fits" / "in-vivo-liver" / "result.json").read_text())[name]
     laws = {f"turn {i}": turn.values for i, turn in enumerate(turns) if np.isfinite(turn.force_rmse)}
     down = (TOUCH, 0.3 + (study["DEPTH"] + 1e-3) / study["SPEED"])
     found = {}

@@ -1,7 +1,9 @@
 """The source's probing simulator (4.1.2): the settled lobe in forty states of 0.3875 mm, stored, and played back.
 
-python fits/source/states.py                 half a minute of a core; writes out/source/lobe.run.h5, states.json
+python fits/source/states.py                 half a minute of a core; writes out/source/lobe.run.h5
 tissuejax play out/source/lobe.run.h5        the page: its states, probe and force, interpolated
+
+The study keeps its numbers as the part "forty states".
 """
 
 import runpy
@@ -11,8 +13,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from tissuejax.cache import source
 from tissuejax.play.stored import Run, RunSession
-from tissuejax.storage import write_json
 from tissuejax.tled.stream import run_to_file
 
 jax.config.update("jax_enable_x64", True)
@@ -24,7 +26,7 @@ FRAMES = 4  # of each state
 def main() -> dict:
     """Simulate, store, play back, and hold the force against that of the study and eq. 4.14."""
     lobe = runpy.run_path(str(HERE / "lobe.py"))
-    out = HERE.resolve().parents[1] / "out" / "source" / "lobe.run.h5"
+    out = source.ROOT.parent / "out" / "source" / "lobe.run.h5"
     out.parent.mkdir(parents=True, exist_ok=True)
     out.unlink(missing_ok=True)
     geometry, u = lobe["settled"](COUNTS)
@@ -41,7 +43,7 @@ def main() -> dict:
     session = RunSession(run, "lobe")
     session.advance(0.5 * (run.times[-1] - run.times[0]))
     between = [0.5 * (run.force_at(a)[2] + run.force_at(b)[2]) for a, b in zip(at[:-1], at[1:])]
-    found = {
+    return {
         "states": len(run.states), "hexes": len(run.cells), "bytes": out.stat().st_size,
         "state_times_s": run.times, "depth_mm": 0.3875 * np.arange(1, 41), "force_N": force,
         "fitted": lobe["exponential"](0.3875 * np.arange(1, 41), force),
@@ -53,8 +55,6 @@ def main() -> dict:
         "greatest_node_step_mm": float(1e3 * np.abs(np.diff(run.states, axis=0)).max()),
         "frame_bytes": len(session.frame(1)),
     }  # fmt: skip
-    write_json(HERE / "states.json", found)
-    return found
 
 
 def seconds(lobe: dict) -> float:

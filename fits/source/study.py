@@ -13,11 +13,13 @@ import jax
 import numpy as np
 from matplotlib.figure import Figure
 
+from tissuejax.cache import source
 from tissuejax.cache.parts import Parts
 from tissuejax.storage import write_text
 
 jax.config.update("jax_enable_x64", True)
 
+STUDIES = source.ROOT.parent / "fits"  # of the checkout: a copy of this folder reads its neighbours there
 COARSE, MIDDLE = (14, 12, 7), (20, 16, 9)
 SITE_MESH = (16, 16, 8)
 SAGS = ((20, 16, 8), (24, 20, 10))
@@ -29,9 +31,9 @@ CYLINDER_ERROR = 3e-4  # N, 4.1.1.1
 
 def needed(folder: Path) -> dict[str, tuple[Path, ...]]:
     """Files beside the package that each kind of part depends on."""
-    liver, bench = folder.parent / "in-vivo-liver", folder.resolve().parents[1] / "tests" / "bench" / "results"
-    scripts = ("study", "lobe", "cylinder", "deep", "markers", "breathing", "table")
-    study, lobe, cylinder, deep, markers, breathing, table = (folder / f"{n}.py" for n in scripts)
+    liver, bench = STUDIES / "in-vivo-liver", source.ROOT.parent / "tests" / "bench" / "results"
+    scripts = ("study", "lobe", "cylinder", "deep", "markers", "breathing", "table", "states")
+    study, lobe, cylinder, deep, markers, breathing, table, states = (folder / f"{n}.py" for n in scripts)
     rig, fitted = liver / "study.py", liver / "result.json"
     return {
         "table": (table, fitted, bench / "step.json", bench / "contact.json"),
@@ -40,6 +42,7 @@ def needed(folder: Path) -> dict[str, tuple[Path, ...]]:
         "deep": (study, deep, rig),
         "markers": (study, markers, rig, fitted),
         "breathing": (study, breathing, rig),
+        "states": (states, lobe),
     }
 
 
@@ -77,11 +80,11 @@ def site_parts(folder: Path, kept: Parts, needs: dict[str, tuple[Path, ...]]) ->
     deep, markers, breathing = (runpy.run_path(str(folder / f"{n}.py")) for n in ("deep", "markers", "breathing"))
 
     def study() -> dict:
-        return runpy.run_path(str(folder.parent / "in-vivo-liver" / "study.py"))
+        return runpy.run_path(str(STUDIES / "in-vivo-liver" / "study.py"))
 
     for name in deep["DEEPEST"]:
         kept.get(f"to 3 N, {name}", lambda name=name: deep["site"](study(), name, SITE_MESH), needs["deep"])
-        kept.get(f"by marker, {name}", lambda name=name: markers["site"](folder, study(), name), needs["markers"])
+        kept.get(f"by marker, {name}", lambda name=name: markers["site"](study(), name), needs["markers"])
     kept.get("breathing", lambda: breathing["breathing"](study()), needs["breathing"])
 
 
@@ -178,7 +181,7 @@ def main(folder: Path) -> str:
     kept = Parts(folder / "result.json", {file for files in needs.values() for file in files})
     lobe, cylinder, table = (runpy.run_path(str(folder / f"{n}.py")) for n in ("lobe", "cylinder", "table"))
     for name, work in table["PARTS"].items():
-        kept.get(name, lambda work=work: work(folder), needs["table"])
+        kept.get(name, work, needs["table"])
     lobe_parts(lobe, kept, needs["lobe"])
     for name, part in list(kept.parts.items()):
         if name.startswith("pressed"):
@@ -186,6 +189,8 @@ def main(folder: Path) -> str:
             kept.get(f"eq. 4.14, {name}", lambda way=way: lobe["exponential"](*way), needs["lobe"], of=way)
     cylinder_parts(cylinder, kept, needs["cylinder"])
     site_parts(folder, kept, needs)
+    played = runpy.run_path(str(folder / "states.py"))["main"]
+    kept.get("forty states", played, needs["states"])
     rows = table["rows"](kept.parts)
     write_text(folder / "table.md", table["text"](rows))
     (folder / "figures").mkdir(exist_ok=True)

@@ -2,11 +2,11 @@
 """The 58 quantitative results of the source's chapters 2 to 4, each beside ours or beside the reason why not."""
 
 import json
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from tissuejax.cache import source
 from tissuejax.energies.ogden import Ogden
 from tissuejax.energies.published import published
 
@@ -20,15 +20,16 @@ class Row(NamedTuple):
     how: str
 
 
+STUDIES = source.ROOT.parent / "fits"
 CURVE = "a curve in a picture: no digits"
 HARDWARE = "measured with hardware; nothing to compute"
 CUTTING = "cutting: with the study of chapter 3"
 REALTIME = "real time: with its own study"
 
 
-def in_vivo(folder: Path) -> dict:
+def in_vivo() -> dict:
     """Averages over the three synthetic sites of fits/in-vivo-liver, as in table 2.2."""
-    sites = json.loads((folder.parent / "in-vivo-liver" / "result.json").read_text())
+    sites = json.loads((STUDIES / "in-vivo-liver" / "result.json").read_text())
     start = np.mean([s["ex_vivo"]["force_N"] for s in sites.values()])
     best = np.mean(
         [min(t["force_N"] for t in s["stress_curve"]["turns"] if t["force_N"] is not None) for s in sites.values()]
@@ -45,9 +46,9 @@ def in_vivo(folder: Path) -> dict:
     }
 
 
-def speed(folder: Path) -> dict:
+def speed() -> dict:
     """Time of a step of 1,000 hexes by the committed benchmarks, ms, and steps a second with contact."""
-    bench = folder.resolve().parents[1] / "tests" / "bench" / "results"
+    bench = source.ROOT.parent / "tests" / "bench" / "results"
     step, touch = (json.loads((bench / f"{name}.json").read_text()) for name in ("step", "contact"))
     thousand = step["1000 hexes"]
     return {
@@ -59,7 +60,7 @@ def speed(folder: Path) -> dict:
     }
 
 
-def forms(_: Path) -> dict:
+def forms() -> dict:
     """Nominal stress of the ex vivo 4-term digits at stretch 0.7 in each Ogden form, by eq. 4.10, Pa."""
     material = published("ex-vivo-ogden")
     mu, a = (np.array([material.constants[f"{k}{i}"] for i in (1, 2, 3, 4)]) for k in ("mu", "alpha"))
@@ -73,7 +74,7 @@ def forms(_: Path) -> dict:
     return found
 
 
-def shapes(_: Path) -> dict:
+def shapes() -> dict:
     """Rates and widths that follow from the printed sizes (2.1.1 to 2.1.3): no slip, one volume."""
     return {
         "compression_rate_1_s": 1.25 / 25.0,
@@ -83,7 +84,7 @@ def shapes(_: Path) -> dict:
     }
 
 
-def noise(_: Path) -> dict:
+def noise() -> dict:
     """Distance of a marker from a smooth surface when each axis is off by 0.25 mm (2.2.1): mean of |N(0, 0.25)|, mm."""
     return {"mean_mm": 0.25 * float(np.sqrt(2 / np.pi)), "with_registration_1.5_mm": 1.5 * float(np.sqrt(2 / np.pi))}
 
@@ -107,7 +108,7 @@ def _press(parts: dict, name: str) -> str:
 
 def _sites() -> dict[str, dict]:
     """The three synthetic sites as fits/in-vivo-liver keeps them."""
-    return json.loads((Path(__file__).resolve().parent.parent / "in-vivo-liver" / "result.json").read_text())
+    return json.loads((STUDIES / "in-vivo-liver" / "result.json").read_text())
 
 
 def _forces(way: str) -> str:
@@ -184,7 +185,7 @@ def _cylinder(parts: dict) -> str:
 
 def rows(parts: dict) -> list[Row]:
     """The table, in the source's order."""
-    cube = json.loads((Path(__file__).resolve().parent.parent / "verification" / "result.json").read_text())["cube"]
+    cube = json.loads((STUDIES / "verification" / "result.json").read_text())["cube"]
     t22, fast = parts["table 2.2, averages"], parts["time of a step"]
     sag = [parts[k] for k in parts if k.startswith("sag, ")]
     sag_text = "; ".join(f"{s['hexes']} hexes: {s['mean_mm']:.2f} mm, {s['height_mm']:.2f} mm" for s in sag)
