@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tissuejax.diagnosis.catalogue import Entry, entries
+from tissuejax.diagnosis.catalogue import Entry, entries, linked
 from tissuejax.diagnosis.probing_runs import TOGETHER
 from tissuejax.effects.catalogue import effects
 from tissuejax.effects.effect import Effect
@@ -18,6 +18,12 @@ OFFERS = {
 } | {("probing", n): kind.in_probings(PROBED) for n, kind in effects("probing").items()}  # fmt: skip
 
 
+def called(key: tuple[str, str]) -> list:
+    """All offers that are reported under one name."""
+    title = {k: o.title or o.effect.name for k, o in OFFERS.items()}
+    return [o for k, o in OFFERS.items() if k[0] == key[0] and title[k] == title[key]]
+
+
 @pytest.mark.parametrize("key", OFFERS, ids="/".join)
 def test_an_offer_speaks_of_the_effect_s_own_parameters(key):
     offer = OFFERS[key]
@@ -30,7 +36,7 @@ def test_an_offer_speaks_of_the_effect_s_own_parameters(key):
         assert {*form.each, *form.most} <= set(form.free)
         for name, values in form.grid.items():
             assert all(declared[name].lower <= v <= declared[name].upper for v in values)
-        assert set(form.beside) <= {f.name for f in offer.forms}
+        assert set(form.beside) <= {f.name for o in called(key) for f in o.forms}
     assert {*offer.scales, *offer.priors, *offer.ranges} <= set(declared)
     assert any(f.nominated for f in offer.forms) or offer.title
 
@@ -73,3 +79,16 @@ def test_ranges_and_priors_follow_from_the_recordings():
     free, start, _ = periodic.declare(Model(energy("neo-hookean"), None, (periodic.effect,)), ("r1",), ())
     f = free["effects.periodic.frequency"]
     assert np.allclose([f.lower, f.upper, start["effects.periodic.frequency"]], [0.0625, 5.0, 0.125])
+
+
+def test_every_form_is_nominated_or_reached_from_one_that_is():
+    """A form that counts in the prior and that no search comes to would only make the others less likely."""
+    model = Model(energy("neo-hookean"), None, tuple(e.effect for e in entries(SIZES))).across(("r1", "r2"))
+    found = entries(SIZES)
+    offered = {c.key: c for e in found for c in e.declare(model, ("r1",), ("r2",))[2]}
+    candidates = linked(found, offered)
+    reached = {k for k, c in candidates.items() if c.nominated}
+    while more := {b for k in reached for b in candidates[k].beside} - reached:
+        reached |= more
+    assert reached == set(candidates)
+    assert "viscoelasticity/load-dependent" in reached

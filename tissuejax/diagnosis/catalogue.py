@@ -6,7 +6,7 @@ What is offered, and in which forms, every effect says itself (`effects.form`).
 import functools
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from tissuejax.diagnosis.bench import Candidate, Free
@@ -128,3 +128,18 @@ def held_in(f: Free, most: float) -> Free:
 def entries(sizes: Sizes) -> list[Entry]:
     """All effects that act in material tests, in their forms."""
     return [Entry.of(kind.in_material_tests(sizes)) for kind in effects("homogeneous").values()]
+
+
+def linked(found: Iterable[Entry], candidates: Mapping[str, Candidate]) -> dict[str, Candidate]:
+    """The candidates, those that two effects have under one name beside each other where a form says so."""
+    keys = {(c.name, c.form): k for k, c in candidates.items()}
+    near: dict[str, list[str]] = {}
+    for entry in found:
+        for form in entry.forms:
+            one = keys.get((entry.title, form.name))
+            for other in (keys.get((entry.title, name)) for name in form.beside):
+                if one and other:
+                    near.setdefault(one, []).append(other)
+                    near.setdefault(other, []).append(one)
+    more = {k: (*candidates[k].beside, *beside) for k, beside in near.items()}
+    return candidates | {k: replace(candidates[k], beside=tuple(dict.fromkeys(b))) for k, b in more.items()}

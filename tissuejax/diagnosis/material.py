@@ -22,7 +22,7 @@ from jaxtyping import Array, Float
 from tissuejax.cache.key import described
 from tissuejax.cache.programs import Kept, ahead
 from tissuejax.diagnosis.bench import Bench, Candidate, Free
-from tissuejax.diagnosis.catalogue import Entry, entries
+from tissuejax.diagnosis.catalogue import Entry, entries, linked
 from tissuejax.diagnosis.judgement.blocks import State, strain
 from tissuejax.diagnosis.periodogram import lines
 from tissuejax.effects.form import Sizes
@@ -188,6 +188,7 @@ class MaterialBench(Bench):
             self.free.update(free)
             self.start.update(start)
             self.candidates.update({c.key: c for c in candidates})
+        self.candidates = linked(found, self.candidates)
         self._amplitudes = {p for c in self.candidates.values() for p in c.amplitudes}
 
     def _size_up(self) -> None:

@@ -41,8 +41,10 @@ class NonlinearViscosity(Effect):
     @classmethod
     def in_material_tests(cls, sizes: Sizes) -> Offer:
         """See `Effect.in_material_tests`."""
-        grid = {"tau": (1.0, 10.0), "stress": (1.0,), "exponent": (3.0,)}
-        form = Form("load-dependent", ("g", "tau", "stress", "exponent"), grid, nominated=False)
+        load = 0.6 * sizes.energy / sizes.strain  # a third of the largest stress
+        grid = {"tau": (0.1 * sizes.recording, sizes.recording), "stress": (load,), "exponent": (3.0,)}
+        free = ("g", "tau", "stress", "exponent")
+        form = Form("load-dependent", free, grid, nominated=False, beside=("one time", "two times"))
         return Offer(cls(), (form,), "viscoelasticity")
 
     @property
@@ -75,9 +77,9 @@ class NonlinearViscosity(Effect):
             None,
             scaled[0],
             saveat=diffrax.SaveAt(ts=time),
-            stepsize_controller=diffrax.PIDController(rtol=1e-6, atol=1e-7),
+            stepsize_controller=diffrax.PIDController(rtol=1e-9, atol=1e-10),
             adjoint=diffrax.DirectAdjoint(),
-            max_steps=4096,
+            max_steps=16384,
             throw=False,
         )
         assert solution.ys is not None  # `saveat` asks for them
