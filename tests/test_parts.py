@@ -2,6 +2,7 @@
 
 import json
 import runpy
+import shutil
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -96,6 +97,24 @@ def test_a_study_names_the_code_of_every_part(name, tmp_path):
     assert all(set(m) <= {"earlier", "code"} and any(m.values()) for m in made_by.values())
     needed = runpy.run_path(str(FITS / name / "study.py"))["needed"](FITS / name)
     assert all(file.is_file() for files in needed.values() for file in files)
+
+
+@pytest.mark.parametrize("name", ["source", "cutting"])
+def test_a_copy_of_a_study_reads_its_neighbours_in_the_checkout(name, tmp_path):
+    """`tissuejax study --out`: numbers of other studies and benchmarks are not beside the copy."""
+    folder = Path(shutil.copytree(FITS / name, tmp_path / "studies" / name))
+    needed = runpy.run_path(str(folder / "study.py"))["needed"](folder)
+    assert all(file.is_file() for files in needed.values() for file in files)
+    beyond = {file for files in needed.values() for file in files if folder not in file.parents}
+    assert beyond
+    assert all(source.ROOT.parent in file.parents for file in beyond)
+
+
+def test_the_table_of_the_source_is_drawn_in_a_copy(tmp_path):
+    """From the numbers that are stored, all 58 rows, with what it takes from the checkout's other studies."""
+    folder = Path(shutil.copytree(FITS / "source", tmp_path / "studies" / "source"))
+    parts = json.loads((folder / "result.json").read_text())
+    assert len(runpy.run_path(str(folder / "table.py"))["rows"](parts)) == 58
 
 
 CASES = """
