@@ -19,7 +19,7 @@ CURRENT = {
                  "material-sixth", "material-seventh", "material-eighth", "material-ninth",
                  "material-tenth", "material-eleventh", "material-twelfth"),
     "probing": ("probing", "probing-strong", "probing-strong-second", "probing-pairs", "probing-second",
-                "probing-strong-third", "probing-third", "probing-fourth", "probing-fifth"),
+                "probing-strong-third", "probing-third", "probing-fourth", "probing-fifth", "probing-sixth"),
 }  # fmt: skip
 
 
