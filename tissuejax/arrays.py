@@ -8,6 +8,7 @@ Float[Given, "..."]         a field that formulas read and the host fills, with 
 
 from typing import TYPE_CHECKING, Any
 
+import jax
 from jax.core import Tracer
 from jaxtyping import Array, ArrayLike
 
@@ -16,6 +17,12 @@ if TYPE_CHECKING:
     Given = Array | Any  # so it is read, and checked, as an array of the device, and whatever comes may be put there
 else:
     Either = Given = ArrayLike
+
+
+def barrier(x: Any) -> Any:
+    """`x`, kept apart from what is made of it, so that XLA computes it once. For programs compiled as `tled.simulate`
+    does, on the CPU; compilers for other devices need no such thing and have no form for it under those options."""
+    return jax.lax.optimization_barrier(x) if jax.default_backend() == "cpu" else x
 
 
 def traced(*values: Given) -> bool:

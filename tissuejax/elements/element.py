@@ -17,7 +17,6 @@ from jaxtyping import Array, Float
 
 Tensor = Float[Array, "3 3 E"]
 Forces = tuple[Float[Array, "k E"], ...]
-barrier = jax.lax.optimization_barrier  # keeps stages apart, see `tled/internal.py`
 
 
 class Element(eqx.Module):

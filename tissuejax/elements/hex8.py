@@ -16,7 +16,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from tissuejax.elements.element import Element, Forces, Tensor, barrier, largest_eigenvalue, parts
+from tissuejax.arrays import barrier
+from tissuejax.elements.element import Element, Forces, Tensor, largest_eigenvalue, parts
 
 SIGNS = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], float

@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from tissuejax.arrays import Either
+from tissuejax.arrays import Either, barrier
 from tissuejax.spectral import power_sums
 from tissuejax.tensors import Sym, determinant, trace, trace_of_square
 
@@ -23,7 +23,7 @@ def whole(x: Float[Either, "..."]) -> Float[Either, "..."]:
 
 @whole.defjvp
 def _whole_jvp(primals, tangents):
-    return whole(primals[0]), jax.lax.optimization_barrier(tangents[0])  # `whole` again: for the derivatives of stress
+    return whole(primals[0]), barrier(tangents[0])  # `whole` again: for the derivatives of stress
 
 
 class Strain(eqx.Module):

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from tissuejax.tled.internal import barrier
+from tissuejax.arrays import barrier
 from tissuejax.tled.scene import Body
 
 

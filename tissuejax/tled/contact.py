@@ -16,9 +16,10 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from tissuejax import tensors
+from tissuejax.arrays import barrier
 from tissuejax.elements.element import parts
 from tissuejax.tled import native
-from tissuejax.tled.internal import add, barrier, take
+from tissuejax.tled.internal import add, take
 from tissuejax.tled.scene import Probe, Scene, filled
 from tissuejax.tled.shapes import Vector
 

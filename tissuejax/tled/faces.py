@@ -14,11 +14,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from tissuejax.arrays import barrier
 from tissuejax.cohesion.engine import Memory, Vector, pull, stored, whole
 from tissuejax.cohesion.law import Law
 from tissuejax.tensors import total
-
-barrier = jax.lax.optimization_barrier
 
 
 class Faces(eqx.Module):

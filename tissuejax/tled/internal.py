@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from tissuejax.arrays import barrier
 from tissuejax.elements.element import Forces, cofactor, determinant, parts
 from tissuejax.energies.strain import Strain
 from tissuejax.tensors import Sym
@@ -19,7 +20,6 @@ from tissuejax.tled import native
 from tissuejax.tled.history import relax
 from tissuejax.tled.scene import Scene, filled
 
-barrier = jax.lax.optimization_barrier
 LINE = 64  # elements are padded to whole vectors and cache lines: an odd number costs up to half as much again
 BLOCK = 256  # elements at most that are taken together, in bodies of more than two such blocks
 
@@ -63,8 +63,9 @@ def mesh(scene: Scene) -> Mesh:
 
 
 def blocks(count: int) -> int:
-    """In how many blocks so many elements are taken."""
-    return -(-count // BLOCK) if count > 2 * BLOCK else 1
+    """In how many blocks so many elements are taken: one where JAX computes elsewhere than on the CPU, whose caches
+    blocks are for."""
+    return -(-count // BLOCK) if count > 2 * BLOCK and jax.default_backend() == "cpu" else 1
 
 
 def padded(count: int) -> int:

@@ -10,9 +10,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from tissuejax.arrays import barrier
 from tissuejax.tled import capsule, contact, faces, internal, loads, stable, support, surface
 from tissuejax.tled.glide import Glide, glide, spurred
-from tissuejax.tled.internal import barrier
 from tissuejax.tled.ledger import Spent
 from tissuejax.tled.scene import Scene, filled
 

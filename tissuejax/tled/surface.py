@@ -11,9 +11,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from tissuejax.arrays import barrier
 from tissuejax.tensors import total
 from tissuejax.tled import contact, faces, native
-from tissuejax.tled.internal import barrier
 from tissuejax.tled.scene import Probe, filled
 
 

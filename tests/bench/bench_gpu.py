@@ -1,0 +1,136 @@
+"""The solver on a graphics card, beside the same machine's processor. Run as a script, once, where a card is.
+
+    python tests/bench/bench_gpu.py
+
+Writes `results/gpu.json` with the card's name: wall nanoseconds an element and step of 88,000 and of 1,000,000 hexes,
+and the simulations that 256 diagnoses of one probing would ask for at once: 256 runs with constants of their own, and
+256 Jacobians to five constants, over one of each. A diagnosis itself is a search that the host drives, one question
+after the other: it has no form as one batch. The processor's figures come from processes of their own, by XLA on all
+cores and, where a compiler is, by the compiled loop on one. Nothing in the project depends on a card.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+import traceback
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from bench_gradient import channels
+from bench_step import VALUES, machine
+
+from tissuejax.energies.reduced_polynomial import ReducedPolynomial
+from tissuejax.energies.volumetric import Quadratic
+from tissuejax.mesh.columns import box
+from tissuejax.tled import build
+from tissuejax.tled.simulate import COMPILER_OPTIONS, compiled
+
+BODIES = {"88,000 hexes": (40, 44, 50), "1,000,000 hexes": (100, 100, 100)}
+STEPS = {"88,000 hexes": 50, "1,000,000 hexes": 10}  # a frame, of 20 frames; a fifth of them on the processor
+BATCH = 256
+SMALL, SMALL_STEPS = (10, 10, 10), 25
+ROUNDS = 3
+HOSTS = {
+    "processor, XLA, all cores": {"TISSUEJAX_NATIVE": "off"},
+    "processor, compiled loop": {},
+}
+
+
+def body(counts, steps: int, dtype):
+    """A cube of soft tissue in gravity, 20 frames of so many steps."""
+    scene = build.scene(
+        box((0.1, 0.1, 0.1), counts),
+        build.Tissue(ReducedPolynomial(order=4), Quadratic(), VALUES, dict(K=2000.0), 981.0),
+        np.arange(20) * 1e-3,
+        gravity=(0, 0, -9.81),
+    )
+    step = 0.5 * float(scene.clock.step)
+    return scene.put({"clock.interval": jnp.asarray(steps * step), "clock.steps": steps}).cast(dtype)
+
+
+def wall(program, *arguments) -> float:
+    """Best seconds of a call that was compiled before."""
+    jax.block_until_ready(program(*arguments))
+    best = float("inf")
+    for _ in range(ROUNDS):
+        begun = time.perf_counter()
+        jax.block_until_ready(program(*arguments))
+        best = min(best, time.perf_counter() - begun)
+    return best
+
+
+def step(name: str, dtype) -> float:
+    """Nanoseconds an element and step."""
+    steps = STEPS[name] if jax.default_backend() != "cpu" else STEPS[name] // 5
+    scene = body(BODIES[name], steps, dtype)
+    if int(compiled(scene).failed) >= 0:
+        raise RuntimeError(f"{name} breaks down: the time of such a run says nothing")
+    return 1e9 * wall(compiled, scene) / (len(scene.body.cells) * scene.clock.frames * scene.clock.steps)
+
+
+def batch(count: int) -> dict[str, float]:
+    """Seconds of so many small runs at once, and of their Jacobians to five constants."""
+    scene = body(SMALL, SMALL_STEPS, jnp.float32)
+    x = jnp.asarray(np.random.default_rng(1).uniform(0.9, 1.1, (count, 5)), jnp.float32)
+
+    def jacobian(x):
+        return jax.vmap(lambda d: jax.jvp(lambda x: channels(x, scene), (x,), (d,))[1])(jnp.eye(5, dtype=x.dtype))
+
+    def jitted(f):
+        return jax.jit(jax.vmap(f), compiler_options=COMPILER_OPTIONS)
+
+    return {
+        "runs": wall(jitted(lambda x: channels(x, scene)), x),
+        "Jacobians": wall(jitted(jacobian), x),
+    }
+
+
+def figures() -> dict:
+    """All of it on the device that JAX has; what fails says why."""
+    found: dict = {"device": str(jax.devices()[0].device_kind)}
+    jobs = {
+        f"{name}, {np.dtype(dtype).name}, ns an element and step": lambda n=name, d=dtype: round(step(n, d), 2)
+        for name in BODIES
+        for dtype in (jnp.float32, jnp.float64)
+    }
+    counts = (1, BATCH) if jax.default_backend() != "cpu" else (1, 4)
+    jobs |= {f"{n} of 1,000 hexes and 500 steps, s": lambda n=n: {k: round(s, 3) for k, s in batch(n).items()}
+             for n in counts}  # fmt: skip
+    for name, job in jobs.items():
+        try:
+            found[name] = job()
+        except Exception as error:  # one that fails, for want of memory say, leaves the others
+            found[name] = f"{type(error).__name__}: {str(error)[:300]}"
+            traceback.print_exc()
+        print(name, found[name], file=sys.stderr, flush=True)
+    return found
+
+
+def hosts() -> dict:
+    """The processor's figures, each in a process of its own."""
+    found = {}
+    for name, extra in HOSTS.items():
+        environment = os.environ | {"JAX_PLATFORMS": "cpu"} | extra
+        done = subprocess.run([sys.executable, __file__, "here"], env=environment, stdout=subprocess.PIPE, check=True)
+        found[name] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+def main() -> None:
+    if jax.default_backend() == "cpu":
+        raise SystemExit("no graphics card that JAX can compute on is here: bench_step.py measures the processor")
+    told = {"card": figures()} | hosts() | {"machine": machine() | {"cores": os.cpu_count()}}
+    target = Path(__file__).parent / "results" / "gpu.json"
+    target.write_text(json.dumps(told, indent=1) + "\n")
+    print(target.read_text())
+
+
+if __name__ == "__main__":
+    jax.config.update("jax_enable_x64", True)
+    print(json.dumps(figures())) if sys.argv[1:] == ["here"] else main()
