@@ -28,6 +28,7 @@ class Free:
         log: fitted as its logarithm (positive over decades: times, rates, periods).
         prior: (mean, standard deviation) or None, of the logarithm where that is fitted.
         limited: True where a fit that rests on the upper limit has run away and is not to be believed.
+        whole: name of what it is a part of, if of anything: parts of one whole never exceed 1 together.
     """
 
     lower: float
@@ -37,6 +38,7 @@ class Free:
     log: bool = False
     prior: tuple[float, float] | None = None
     limited: bool = False
+    whole: str = ""
 
 
 @dataclass(frozen=True)

@@ -51,6 +51,8 @@ class Entry(Offer):
                     held += [f"{prefix}.{name}.{r}" for r in held_out]
                 for path in (*own, *(h for h in held if h.startswith(f"{prefix}.{name}."))):
                     f = limits(p, shape, form.grid.get(name, self.effect.grid.get(name, ())), form.reach)
+                    if name in self.effect.shares:
+                        f = replace(f, whole=prefix)
                     if name in self.effect.misjudged:
                         f = replace(f, prior=(0.0, self.effect.misjudged[name]))
                     if name in form.most:

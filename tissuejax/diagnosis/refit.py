@@ -1,8 +1,7 @@
 """Full refits: all base parameters, amplitudes and shapes of a set of candidates together, within bounds.
 
 Every step is a small bounded linear problem (`estimation.methods.broyden`), so that one-sided amplitudes rest on
-their bound exactly and leave it when the data want them to. Positive shapes move in logarithm. What belongs to one
-recording alone (an offset, a phase) is fitted on the held-out recordings too, all else fixed.
+their bound exactly and leave it when the data want them to. Positive shapes move in logarithm.
 """
 
 import math
@@ -10,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from tissuejax.diagnosis.bench import Bench, Free
 from tissuejax.diagnosis.misfit import Misfit
@@ -18,8 +17,10 @@ from tissuejax.estimation.covariance import inflation, standard_errors
 from tissuejax.estimation.descent import Ended, descend
 from tissuejax.estimation.methods import broyden
 from tissuejax.estimation.posed import LeastSquares
-from tissuejax.estimation.reach import Reach
+from tissuejax.estimation.reach import Reach, Whole
 from tissuejax.estimation.solution import Limits, Solution
+
+NEAR = 1e-6  # of a parameter's scale or range: what rests on its end
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,28 @@ class Refit(Solution):
         return Limits(free.lower, free.upper, free.log)
 
 
+@dataclass(frozen=True)
+class Resting:
+    """What of a point rests on an end of its range.
+
+    Attributes:
+        on: whether it does, by parameter; side: +1 on the lower end, -1 on the upper one, or to which it is nearer.
+        full: parts that take up their whole: the largest, which stands for their sum and rests on its upper end, and
+            the others, which move at its cost.
+    """
+
+    on: Bool[np.ndarray, " p"]
+    side: Float[np.ndarray, " p"]
+    full: tuple[tuple[int, np.ndarray], ...] = ()
+
+    def along(self, slopes: Float[np.ndarray, "... p"]) -> Float[np.ndarray, "... p"]:
+        """Slopes by the parameters turned into slopes by what stands for them."""
+        out = slopes.copy()
+        for largest, others in self.full:
+            out[..., others] -= slopes[..., [largest]]
+        return out
+
+
 class Descent(LeastSquares):
     """The parameters `paths` of a bench as a least-squares problem on some recordings, the rest of the values held.
 
@@ -99,7 +122,36 @@ class Descent(LeastSquares):
         self.scale = np.array([1.0 if f.log else f.scale for f in free])
         self.turns = np.array([f.unit == "rad" for f in free], bool)
         self.priors = [(i, *f.prior) for i, f in enumerate(free) if f.prior is not None]
+        self.wholes = self._wholes()
         self.predictions: dict[bytes, np.ndarray] = {}
+
+    def _wholes(self) -> tuple[Whole, ...]:
+        """What free parameters are parts of, less those that are held or known."""
+        groups: dict[str, list[int]] = {}
+        for i, path in enumerate(self.paths):
+            groups.setdefault(self.bench.free[path].whole, []).append(i)
+        stated = {**getattr(self.bench, "known", {}), **self.rest}
+        found = []
+        for name, members in groups.items():
+            if name:
+                others = (p for p, f in self.bench.free.items() if f.whole == name and p not in self.paths)
+                most = 1.0 - sum(stated.get(p, 0.0) for p in others)
+                found.append(Whole(tuple(members), max(most, 0.0)))
+        return tuple(found)
+
+    def resting(self, x: Float[np.ndarray, " p"]) -> "Resting":
+        """What of x rests on an end of its range, and what takes up its whole."""
+        span = np.minimum(np.where(np.isfinite(self.high - self.low), self.high - self.low, 1.0), self.scale)
+        on = (x - self.low < NEAR * span) | (self.high - x < NEAR * span)
+        side = np.where(x - self.low <= self.high - x, 1.0, -1.0)
+        full = []
+        for whole in self.wholes:
+            members = np.array(whole.members)
+            if whole.excess(x) > -NEAR:
+                most = members[np.argmax(x[members])]
+                full.append((int(most), members[members != most]))
+                on[most], side[most] = True, -1.0
+        return Resting(on, side, tuple(full))
 
     def natural(self, x: Float[np.ndarray, " p"]) -> dict[str, float]:
         """Values of the free paths at x."""
@@ -108,7 +160,10 @@ class Descent(LeastSquares):
     def point(self, values: Mapping[str, float]) -> Float[np.ndarray, " p"]:
         """x inside the box from values."""
         x = [np.log(max(values[p], 1e-300)) if log else values[p] for p, log in zip(self.paths, self.log)]
-        return np.clip(np.array(x), self.low, self.high)
+        inside = np.clip(np.array(x), self.low, self.high)
+        for whole in self.wholes:
+            inside = whole.shrunk(inside)
+        return inside
 
     def residuals(self, x: Float[np.ndarray, " p"]) -> Float[np.ndarray, " n"]:
         """Whitened (predicted - measured), with the rows of the priors."""
@@ -147,7 +202,7 @@ class Descent(LeastSquares):
             jac: the Jacobian at x (as `jacobian` gives it) where it is known already.
         """
         costly = self.bench.costly
-        reach = Reach(self.low, self.high, self.scale, turns=self.turns)
+        reach = Reach(self.low, self.high, self.scale, turns=self.turns, wholes=self.wholes)
         method = broyden(reach, iterations, tolerance, jac, self.sharpen if costly else None, costly)
         return descend(self, x, method)
 
@@ -158,10 +213,9 @@ class Descent(LeastSquares):
     def errors(self, x: np.ndarray, r: np.ndarray) -> tuple[dict[str, float], tuple[str, ...], float]:
         """Standard errors in natural coordinates (see `inflation`), the paths on a bound, degrees of freedom."""
         inflate, dof = inflation(float(r @ r), len(r), len(x), self.bench.estimated)
-        span = np.minimum(np.where(np.isfinite(self.high - self.low), self.high - self.low, 1.0), self.scale)
-        at = (x - self.low < 1e-6 * span) | (self.high - x < 1e-6 * span)
-        std = np.full(len(x), np.nan)
-        jac = self.jacobian(x)
+        resting = self.resting(x)
+        at, std = resting.on, np.full(len(x), np.nan)
+        jac = resting.along(self.jacobian(x))
         norms = np.linalg.norm(jac, axis=0)
         use = ~at & (norms > 0) & np.isfinite(norms)
         if use.any():

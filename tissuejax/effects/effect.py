@@ -35,6 +35,7 @@ class Effect(eqx.Module):
         words: clauses that say what its fitted parameters mean, "{g1:%} of the stress relaxes with {tau1}": `:%` is a
             percentage, `:exp` the exponential, else the number with its unit. A clause is said where all parameters in
             it were fitted and its first one, or another of that unit, isn't zero; one without parameters always.
+        shares: of these, parts of one whole, which together stay below it.
         needs: what a protocol of material tests must do to show it, a property of `diagnosis.offered.Protocol`; "" if
             nothing in particular. Where it is lacking the effect is another strain energy by its deeds, or nothing.
         timed: parameters that act in time, so that they mean nothing where no times were recorded.
@@ -76,6 +77,7 @@ class Effect(eqx.Module):
     words: ClassVar[tuple[str, ...]] = ()
     source: ClassVar[str]
     amplitudes: ClassVar[tuple[str, ...]]
+    shares: ClassVar[tuple[str, ...]] = ()
     needs: ClassVar[str] = ""
     timed: ClassVar[tuple[str, ...]] = ()
     slow: ClassVar[tuple[str, ...]] = ()

@@ -30,7 +30,7 @@ from tissuejax.diagnosis.judgement.mass import amplitude_mass
 from tissuejax.diagnosis.judgement.rest import beyond, numerical, rest, unlike_noise, wobble
 from tissuejax.diagnosis.judgement.scales import Scales, log_prior, squared, with_priors
 from tissuejax.diagnosis.judgement.whitening import Whitening
-from tissuejax.diagnosis.refit import Descent, Refit, refit
+from tissuejax.diagnosis.refit import Descent, Refit, Resting, refit
 from tissuejax.estimation.discrepancy import Part
 
 ROUNDS = 4  # of fit and amplitudes in turn
@@ -94,7 +94,7 @@ class Round:
     linear: Linear
 
 
-def resting(slope: float, curvature: float) -> float:
+def beside(slope: float, curvature: float) -> float:
     """Log of int_0^inf exp(-slope x - curvature x^2 / 2) dx: what a parameter on its bound has beside it."""
     h = max(curvature, 1e-300)
     return 0.5 * math.log(math.pi / (2 * h)) + math.log(erfcx(max(slope, 0.0) / math.sqrt(2 * h)))
@@ -144,26 +144,27 @@ def weigh(
             break  # shares of it would cover all that was measured
         descent = Descent(bench, misfit, tuple(fit.values), names, {})
         x = descent.point(fit.values)
-        span = np.minimum(
-            np.where(np.isfinite(descent.high - descent.low), descent.high - descent.low, 1.0), descent.scale
-        )
-        bound = (x - descent.low < 1e-6 * span) | (descent.high - x < 1e-6 * span)
+        resting = descent.resting(x)
+        bound = resting.on
         raw = scales.cut.mean(bench.jacobian(fit.values, descent.paths, names))
-        jac = raw * np.where(descent.log, [fit.values[p] for p in descent.paths], 1.0)
+        slopes = resting.along(raw)
+        jac = slopes * np.where(descent.log, [fit.values[p] for p in descent.paths], 1.0)
         if not np.isfinite(squared(jac / scales.blocked.sigma[:, None])):
             break  # a prediction without a slope, or with one beyond all numbers: no density is to be had there
         residual = y - scales.cut.mean(fit.prediction)
-        parts = scales.about(fit.prediction, bench, keys, fit.values, raw[:, ~bound])
+        parts = scales.about(fit.prediction, bench, keys, fit.values, slopes[:, ~bound])
         prior = [priors.get(p) for p in descent.paths]
         weak = np.array([0.0 if p is None else p[1] ** -2 for p in prior])
         offset = np.array([0.0 if p is None else a - p[0] for a, p in zip(x, prior, strict=True)])
+        if resting.full:
+            offset = np.divide(resting.along(weak * offset), weak, out=offset, where=weak > 0)
         # what nothing is known of, neither from the data nor before, has no density and is left alone
         dead = np.max(np.abs(jac), axis=0, initial=0.0) * descent.scale <= NOTHING * scales.peak
-        inner = ~bound & ~(dead & (weak == 0))
-        linear = Linear(residual, jac[:, inner], offset[inner], weak[inner])
+        free = ~bound & ~(dead & (weak == 0))
+        linear = Linear(residual, jac[:, free], offset[free], weak[free])
         v, m = _amplitudes(linear, parts, widths, scales.blocked, v, anew, bench.costly)
         anew = False
-        value = m.value + 0.5 * int(np.sum(inner)) * math.log(2 * math.pi)
+        value = m.value + 0.5 * int(np.sum(free)) * math.log(2 * math.pi)
         # of these parameters, and not of those that a straight line leads to: the parts move with the prediction
         ahead = 0.5 * float(m.step @ m.precision @ m.step)
         value -= ahead
@@ -173,7 +174,7 @@ def weigh(
             if q is not None
         )
         # what rests on a bound was left out of the integral: its own factor, and its prior's square, follow
-        held = _on_bounds(scales, parts, v, residual, jac, x, descent, bound, weak, offset)
+        held = _on_bounds(scales, parts, v, residual, jac, resting, weak, offset, free, m.precision)
         occam = amplitude_mass(linear, parts, widths, scales.blocked, v, m)
         total = value + held + occam
         if best is None or total > best.total + 1e-6:
@@ -222,9 +223,13 @@ def _amplitudes(linear, parts, widths: Widths, blocked, v, anew: bool, both: boo
     return max(tried, key=lambda t: t[1].value + float(np.sum(widths.log_shape(t[0] / widths.width**2))))
 
 
-def _on_bounds(scales, parts, v, residual, jac, x, descent, bound, weak, offset) -> float:
-    """Log mass beside the bounds of what rests on them, the other parameters held."""
-    if not bound.any():
+def _on_bounds(scales, parts, v, residual, jac, resting: Resting, weak, offset, free, precision) -> float:
+    """Log mass beside the bounds of what rests on them.
+
+    Each with the `free` parameters, of that precision, integrated out: what they take up of its curvature is no
+    information on it. Of two on their bounds the other is held.
+    """
+    if not resting.on.any():
         return 0.0
     inverse = [np.linalg.inv(b) for b in scales.blocked.within(parts, v)]
     u = smooth(parts, v)
@@ -240,12 +245,14 @@ def _on_bounds(scales, parts, v, residual, jac, x, descent, bound, weak, offset)
         return light - g @ np.linalg.solve(inner, u.T @ light)
 
     w, total = whole(residual), 0.0
-    for i in np.flatnonzero(bound):
-        side = 1.0 if x[i] - descent.low[i] <= descent.high[i] - x[i] else -1.0
-        slope = side * float(weak[i] * offset[i] - jac[:, i] @ w)
-        curvature = float(jac[:, i] @ whole(jac[:, i]) + weak[i])
+    others = whole(jac[:, free])
+    for i in np.flatnonzero(resting.on):
+        slope = float(resting.side[i]) * float(weak[i] * offset[i] - jac[:, i] @ w)
+        shared = jac[:, i] @ others
+        taken = shared @ np.linalg.solve(precision, shared) if len(shared) else 0.0
+        curvature = float(jac[:, i] @ whole(jac[:, i]) + weak[i] - taken)
         if curvature > 0:
-            total += resting(slope, curvature) - 0.5 * float(weak[i] * offset[i] ** 2)
+            total += beside(slope, curvature) - 0.5 * float(weak[i] * offset[i] ** 2)
     return total
 
 
