@@ -1,10 +1,9 @@
 """Noise that is correlated in time, as the block means of a judgement see it.
 
-A recorded noise level is that of single samples, and says nothing of how much of it a filter or an amplifier carries
-from one to the next. Taken for white, what is carried would be left over in means of many samples and be called a rest.
-So the share that is correlated, and its time, are read from the residual of the base model beside whatever mismatch it
-holds (`estimation.correlation`); the level stays the recorded one. Of noise that was not recorded nothing is said here:
-its level was estimated with its correlation already.
+A noise level, recorded or estimated, is that of single samples, and says nothing of how much of it a filter or an
+amplifier carries from one to the next. Taken for white, what is carried would be left over in means of many samples and
+be called a rest. So the share that is correlated, and its time, are read from the residual of the base model beside
+whatever mismatch it holds (`estimation.correlation`); the level stays what it was.
 """
 
 from dataclasses import replace
@@ -22,7 +21,7 @@ from tissuejax.estimation.series import Segment
 
 def coloured(blocked: Blocked, bench: Bench, cut: Blocks, prediction: Float[np.ndarray, " N"]) -> Blocked | None:
     """The same blocks under the noise that the residual of `prediction` shows; None where that is white as before."""
-    if bench.estimated or bench.costly:
+    if bench.costly:
         return None
     misfit = estimated(bench, prediction)
     if all(misfit.noise(s).is_white(s.time) for s in bench.segments):

@@ -272,11 +272,28 @@ class Exploration:
             {**parent.refit.values, **setting, **inside(self.bench, candidate, step, setting, parent.refit.values)}
             for _, step, setting in distinct(score, self.effort.starts, whole=not key and self.effort.starts > 1)
         ]
-        alone = self.weighed.get(frozenset({score.key}))
-        if key and alone is not None and not self.bench.costly:  # beside a discrepancy that has taken up the misfit a
-            own = {p: x for p, x in alone.refit.values.items() if p not in parent.refit.values}  # step from nothing is
-            starts.append({**parent.refit.values, **own})  # short, and a gap, say, is far from where it leads
-        return self.weigh((*parent.evidence.keys, score.key), starts, bench=parent.bench)
+        alone = self._alone(key, score.key)
+        # beside a discrepancy that has taken up the misfit a step from nothing is short: a gap, say, is far from where
+        # it leads, and another form of the effect promises more
+        starts += [alone[score.key]] if score.key in alone else []
+        found = self.weigh((*parent.evidence.keys, score.key), starts, bench=parent.bench)
+        for form in [k for k in alone if k != score.key]:
+            self.weigh((*parent.evidence.keys, form), [alone[form]], bench=parent.bench)
+        return found
+
+    def _alone(self, key: frozenset, form: str) -> dict[str, dict[str, float]]:
+        """Starts of a set that grows from `key` by this form, and by that form of the effect that was best alone: the
+        parameters that they had there, beside those of `key`."""
+        if not key or self.bench.costly:
+            return {}
+        name, at = self.bench.candidates[form].name, self.weighed[key].refit.values
+        singles = {next(iter(k)): w for k, w in self.weighed.items() if len(k) == 1 and self.names(k) == {name}}
+        wanted = {form, max(singles, key=lambda k: self.worth(frozenset({k})))} if singles else {form}
+        return {
+            k: {**at, **{p: x for p, x in singles[k].refit.values.items() if p not in at}}
+            for k in wanted & set(singles)
+            if not self.bench.candidates[k].widens
+        }
 
     def reshape(self, key: frozenset) -> None:
         """Weigh a set in the other forms of its effects, from form to neighbouring form as long as that gains."""
