@@ -7,9 +7,11 @@ tissuejax study fits/challenge
 
 import csv
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
-from tissuejax.challenge.rates import STATED, rate
+from tissuejax.challenge.calibration import calibration
+from tissuejax.challenge.rates import rate
 from tissuejax.storage import write_json, write_text
 
 VISIBLE = 3.0
@@ -21,6 +23,13 @@ CURRENT = {
     "probing": ("probing", "probing-strong", "probing-strong-second", "probing-pairs", "probing-second",
                 "probing-strong-third", "probing-third", "probing-fourth", "probing-fifth", "probing-sixth"),
 }  # fmt: skip
+
+
+NEWEST = {
+    "material tests": ("material-eleventh", "material-twelfth"),
+    "beside a rest": ("rest-sixth",),
+    "probings": ("probing-fifth", "probing-sixth"),
+}  # of the judgement as it is
 
 
 def sets(folder: Path, kind: str) -> dict[str, list[dict]]:
@@ -70,17 +79,44 @@ def apt(row: dict) -> bool:
     return true(row, "open_right" if row["verdict"] == "ambiguous" else "right")
 
 
+@dataclass(frozen=True)
+class Said:
+    """What was said of a case, and whether it is true."""
+
+    verdict: str
+    confidence: float
+    apt: bool
+
+
+def said(rows: list[dict]) -> list[Said]:
+    """Those of graded rows."""
+    return [Said(r["verdict"], float(r["confidence"] or "nan"), apt(r)) for r in rows]
+
+
 def confidence(rows: list[dict]) -> dict:
-    """Stated against true, and the expected calibration error."""
-    stated = [r for r in rows if r["confidence"] not in ("", "nan")]
-    bins = []
-    for low, high in zip(STATED, STATED[1:]):
-        here = [r for r in stated if low <= float(r["confidence"]) < high or (high == 1 == float(r["confidence"]))]
-        if here:
-            mean = sum(float(r["confidence"]) for r in here) / len(here)
-            bins.append({"from": low, "to": high, "stated": mean} | rate(here, apt))
-    error = sum(b["of"] * abs(b["stated"] - b["share"]) for b in bins) / max(len(stated), 1)
-    return {"bins": bins, "expected_calibration_error": error, "of": len(stated)}
+    """Stated against true."""
+    return calibration(said(rows))
+
+
+def by_answer(folder: Path) -> tuple[dict, list[str]]:
+    """Stated against true by the kind of answer, of the sets that the judgement as it is has been asked."""
+    found, lines = {}, []
+    for kind, names in NEWEST.items():
+        rows = []
+        for name in names:
+            with (folder / name / "graded.csv").open() as file:
+                rows += list(csv.DictReader(file))
+        found[kind] = confidence(rows)
+        lines.append(
+            f"| {kind}: all | {found[kind]['of']} | | | {found[kind]['expected_calibration_error']:.2f} "
+            f"({found[kind]['error_by_chance']:.2f}) |"
+        )
+        for verdict, r in found[kind]["by_verdict"].items():
+            lines.append(
+                f"| {kind}: {verdict} | {r['of']} | {r['stated']:.2f} | {r['share']:.2f} ({r['low']:.2f} to "
+                f"{r['high']:.2f}) | {r['expected_calibration_error']:.2f} ({r['error_by_chance']:.2f}) |"
+            )
+    return found, lines
 
 
 def share(r: dict) -> str:
@@ -112,13 +148,22 @@ def main(folder: Path) -> str:
             lines.append(
                 f"| {b['from']:g} to {b['to']:g} | {b['stated']:.2f} | {share(b)} | {b['low']:.0%} to {b['high']:.0%} |"
             )
+    told, rows = by_answer(folder)
+    found["by_answer"] = told
+    lines += ["", "By the kind of answer, newest sets alone; in brackets what as many answers of the same confidence would "
+              "err by if each were true as often as it says:", "", "| answers | of | stated | true (95 % interval) | "
+              "calibration error (by chance) |", "|---|---|---|---|---|", *rows]  # fmt: skip
     write_json(folder / "pooled.json", found)
     readme = folder / "README.md"
     text = readme.read_text()
     head, _, rest = text.partition(BEGIN)
     _, _, tail = rest.partition(END)
     write_text(readme, f"{head}{BEGIN}" + "\n".join(lines) + f"\n{END}{tail}")
-    return "; ".join(f"{k}: singles {share(f['all']['visible singles: right and no other'])}" for k, f in found.items())
+    return "; ".join(
+        f"{k}: singles {share(f['all']['visible singles: right and no other'])}"
+        for k, f in found.items()
+        if k in CURRENT
+    )
 
 
 if __name__ == "__main__":

@@ -8,10 +8,9 @@ import os
 from dataclasses import asdict
 from pathlib import Path
 
-import numpy as np
-
 from tissuejax.challenge import files
-from tissuejax.challenge.rates import STATED, rate, spread
+from tissuejax.challenge.calibration import calibration
+from tissuejax.challenge.rates import rate, spread
 from tissuejax.challenge.rest_grade import grade_rest
 from tissuejax.challenge.verdicts import SETTLED, Mark, mark
 from tissuejax.errors import InputError
@@ -150,20 +149,6 @@ def by_size(marks: list[Mark]) -> list[dict]:
                 end = None if math.isinf(high) else high
                 rows.append({"category": category, "measure": name, "from": low, "to": end} | rate(some, test))
     return rows
-
-
-def calibration(marks: list[Mark]) -> dict:
-    """Stated confidence against how often the answer as such was true, expected calibration error and Brier score."""
-    stated = [m for m in marks if math.isfinite(m.confidence)]
-    rows = []
-    for low, high in zip(STATED, STATED[1:]):
-        here = [m for m in stated if low <= m.confidence < high or (high == 1 and m.confidence == 1)]
-        if here:
-            mean = float(np.mean([m.confidence for m in here]))
-            rows.append({"from": low, "to": high, "stated": mean} | rate(here, lambda m: m.apt))
-    brier = float(np.mean([(m.confidence - m.apt) ** 2 for m in stated])) if stated else None
-    error = sum(b["of"] * abs(b["stated"] - b["share"]) for b in rows) / len(stated) if stated else None
-    return {"bins": rows, "expected_calibration_error": error, "brier": brier, "of": len(stated)}
 
 
 def table(rows: list[dict]) -> str:

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tissuejax.challenge.rates import STATED, rate, spread
+from tissuejax.challenge.calibration import calibration
+from tissuejax.challenge.rates import rate, spread
 from tissuejax.challenge.verdicts import SETTLED, names_in
 from tissuejax.errors import InputError
 
@@ -161,6 +162,7 @@ def summary(answers: Sequence[Answer]) -> dict:
         "confusion": matrix,
         "f1": scores(matrix),
         "macro_f1": macro_f1(matrix),
+        "macro_f1_of_all_names": names_f1(answers),
         "calibration": calibration(answers),
         "seconds": spread([a.seconds for a in answers if math.isfinite(a.seconds)]),
     }
@@ -187,21 +189,22 @@ def scores(matrix: Mapping[str, Mapping[str, int]]) -> dict[str, float]:
     return out
 
 
+def names_f1(answers: Sequence[Answer]) -> float:
+    """Macro-F1 where every name that is given counts: a second name that the protocol does not allow is a false
+    positive of that name, whatever stands before it. Causes alone have an F1: a wrong name that is no sample's cause
+    counts with the cause that it was given in place of or beside."""
+    causes = sorted({a.truth for a in answers if not a.cause.null})
+    scored = []
+    for cause in causes:
+        own = [a for a in answers if a.truth == cause]
+        words = set(cause.split(" or "))
+        right = sum(a.met for a in own)
+        strays = sum(bool(set(a.wrong) - {w for c in causes for w in c.split(" or ")}) for a in own)
+        false = strays + sum(bool(words & set(a.wrong)) for a in answers if a.truth != cause)
+        scored.append(2 * right / (2 * right + false + len(own) - right))
+    return float(np.mean(scored)) if scored else math.nan
+
+
 def macro_f1(matrix: Mapping[str, Mapping[str, int]]) -> float:
     """Mean of the causes' F1, nothing among them, each counting alike however many samples it has."""
     return float(np.mean(list(scores(matrix).values()))) if matrix else math.nan
-
-
-def calibration(answers: Sequence[Answer]) -> dict:
-    """How often the answer was right by what was stated; expected calibration error and Brier score (Naeini 2015)."""
-    stated = [a for a in answers if math.isfinite(a.confidence)]
-    rows, error = [], 0.0
-    for low, high in zip(STATED, STATED[1:]):
-        here = [a for a in stated if low <= a.confidence < high or (high == 1 and a.confidence == 1)]
-        if here:
-            mean = float(np.mean([a.confidence for a in here]))
-            row = rate(here, lambda a: a.apt)
-            error += len(here) / len(stated) * abs(mean - row["share"])
-            rows.append({"from": low, "to": high, "stated": mean} | row)
-    brier = float(np.mean([(a.confidence - a.apt) ** 2 for a in stated])) if stated else None
-    return {"bins": rows, "expected_calibration_error": error if stated else None, "brier": brier, "of": len(stated)}

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from tissuejax.challenge import files
-from tissuejax.challenge.rates import STATED, rate, spread
+from tissuejax.challenge.calibration import calibration
+from tissuejax.challenge.rates import rate, spread
 from tissuejax.challenge.rest_marks import FACTOR, NO_PROCESS, RestMark, mark_rest
 from tissuejax.challenge.verdicts import SETTLED
 from tissuejax.errors import InputError
@@ -75,14 +76,6 @@ def summary(marks: list[RestMark]) -> dict:
         for law in sorted({x for m in marks for x in m.laws})
     }
     right, false, missed = (sum(m.where[i] for m in marks) for i in range(3))
-    stated = [m for m in marks if math.isfinite(m.confidence)]
-    bins = []
-    for low, high in zip(STATED, STATED[1:]):
-        here = [m for m in stated if low <= m.confidence < high or (high == 1 and m.confidence == 1)]
-        if here:
-            mean = float(np.mean([m.confidence for m in here]))
-            bins.append({"from": low, "to": high, "stated": mean} | rate(here, lambda m: m.apt))
-    error = sum(b["of"] * abs(b["stated"] - b["share"]) for b in bins) / len(stated) if stated else None
     return {
         "rates": rates,
         "by_ratio": by_ratio,
@@ -90,7 +83,7 @@ def summary(marks: list[RestMark]) -> dict:
         "where_f1": 2 * right / (2 * right + false + missed) if right + false + missed else None,
         "rest_over_true": spread([m.rest_over_true for m in marks if math.isfinite(m.rest_over_true)]),
         "kept_error_over_rest": spread([m.kept_ratio for m in marks if math.isfinite(m.kept_ratio)]),
-        "calibration": {"bins": bins, "expected_calibration_error": error, "of": len(stated)},
+        "calibration": calibration(marks),
         "seconds": spread([m.seconds for m in marks if math.isfinite(m.seconds)]),
     }
 
