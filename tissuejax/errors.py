@@ -43,3 +43,7 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> InputError:
     close = difflib.get_close_matches(name, known, n=3, cutoff=0.4)
     hint = f"Did you mean {' or '.join(repr(c) for c in close)}?" if close else ""
     return InputError(f"unknown {kind} {name!r}. {hint} Known: {', '.join(known)}.".replace("  ", " "))
+
+
+class CoarseMesh(UserWarning):
+    """A simulation ran, and its elements are too few or too soft in bending for what was asked of them."""

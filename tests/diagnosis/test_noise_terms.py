@@ -70,6 +70,13 @@ def test_noise_that_is_carried_from_sample_to_sample_is_no_rest():
     assert answer.as_dict()["rest"]["share_of_peak"] < 0.004
 
 
+def test_nor_is_it_where_its_level_was_not_recorded():
+    """The level is estimated from single samples; in means of many what they share is left over."""
+    answer = asked(recorded(carried, stated=None))
+    assert answer.verdict.kind == "nothing-missing"
+    assert answer.as_dict()["rest"]["share_of_peak"] < 0.004
+
+
 @pytest.mark.parametrize(
     ("disturbed", "verdict", "level"),
     [

@@ -67,8 +67,8 @@ FAULTS = (
 )  # fmt: skip
 
 
-def caught(fault: Fault) -> bool:
-    """Whether the test fails with the fault and passes without it, in the working directory."""
+def caught(fault: Fault) -> tuple[bool, int]:
+    """Whether the test fails with the fault and passes without it, in the working directory, and its exit code."""
     path = Path("tissuejax", fault.module)
     text = path.read_text()
     if text.count(fault.right) != 1:
@@ -80,7 +80,7 @@ def caught(fault: Fault) -> bool:
         passed.append(subprocess.run(command, shell=True, stdout=subprocess.DEVNULL, check=False).returncode)
     if passed[1] != 0:
         raise SystemExit(f"{fault.name}: {fault.test} fails without the fault")
-    return passed[0] == 1
+    return passed[0] == 1, passed[0]
 
 
 def main(words: str = "") -> int:
@@ -94,9 +94,10 @@ def main(words: str = "") -> int:
             os.environ |= {"PYTHONPATH": str(copy), "TISSUEJAX_CACHE": "off", "PYTHONDONTWRITEBYTECODE": "1"}
             for fault in FAULTS:
                 if words in fault.name:
-                    found = caught(fault)
+                    found, code = caught(fault)
                     survived += not found
-                    print(f"{'caught' if found else 'SURVIVED':<9} {fault.name}  [{fault.test}]", flush=True)
+                    said = "caught" if found else "SURVIVED"
+                    print(f"{said:<9} {fault.name}  [{fault.test}, exit code {code}]", flush=True)
         finally:
             os.chdir(HERE)
             subprocess.run(["git", "-C", HERE, "worktree", "remove", "--force", copy], check=True)

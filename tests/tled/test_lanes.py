@@ -269,3 +269,45 @@ def test_a_memory_at_its_neutral_value_changes_no_bit_of_the_forces(name, rng):
         return found(u, 0.1)[0]
 
     assert np.array_equal(forces(scene), forces(scene.put(MEMORIES[name])))
+
+
+def test_tets_with_averaged_pressure_are_the_same_in_c(monkeypatch):
+    """Two loops with the pressure at the nodes between them; by XLA one gather and scatter of all of it."""
+    body = cases.tets(box((0.04, 0.04, 0.04), (3, 3, 3)))
+    scene = cases.plain(body, np.arange(2.0), order=2)
+    assert scene.body.element.averaged_pressure
+    rng = np.random.default_rng(5)
+    u = jnp.asarray(1e-3 * rng.normal(size=(3, len(body.points))))
+    w = jnp.asarray(rng.normal(size=u.shape))
+
+    def pulled(x, u):
+        values = {k: x * v for k, v in scene.tissue.energy_values.items()}
+        here = scene.put({"tissue.energy_values": values, "tissue.volumetric_values": {"K": 3e4 * x}})
+        mesh = internal.mesh(here)
+        return jnp.vdot(w, internal.forces(here, mesh, u, internal.rest(here, mesh), 0.1)[0])
+
+    found = {}
+    for name, on in (("C", True), ("XLA", False)):
+        monkeypatch.setattr(native, "wanted", lambda on=on: on)
+        value, slopes = jax.jit(jax.value_and_grad(lambda x, u: pulled(x, u), (0, 1)))(jnp.asarray(1.2), u)
+        along = jax.jit(lambda x, u: jax.jvp(pulled, (x, u), (jnp.asarray(1.0), w))[1])(jnp.asarray(1.2), u)
+        found[name] = (value, *slopes, along)
+    for by_c, by_xla in zip(found["C"], found["XLA"], strict=True):
+        np.testing.assert_allclose(by_c, by_xla, rtol=1e-10, atol=1e-12 * float(jnp.max(jnp.abs(by_xla))))
+
+
+def test_on_another_device_no_program_has_barriers(monkeypatch):
+    """Compilers for a graphics card have no form for them under the options that keep them on the CPU."""
+    scene = cases.plain(box((0.04, 0.04, 0.04), (3, 3, 3)), np.arange(2.0), order=2)
+    monkeypatch.setattr(native, "wanted", lambda: False)
+
+    def barriers():
+        def force(u):
+            return internal.forces(scene, internal.mesh(scene), u, internal.History(None, None), 0.1)[0]
+
+        u = jnp.zeros((3, len(scene.body.points)))
+        return str(jax.make_jaxpr(lambda u: jax.jvp(force, (u,), (u,)))(u)).count("optimization_barrier")
+
+    assert barriers() > 5
+    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
+    assert barriers() == 0

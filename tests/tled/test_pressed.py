@@ -1,5 +1,7 @@
 """Contact is not passed through unsaid; step and penalty follow the pressed tissue; failures have their name."""
 
+import warnings
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from tests.tled import cases
 from tissuejax.energies.published import published
 from tissuejax.energies.reduced_polynomial import ReducedPolynomial
 from tissuejax.energies.volumetric import Quadratic
-from tissuejax.errors import NotConverged, UnstableSimulation
+from tissuejax.errors import CoarseMesh, NotConverged, UnstableSimulation
 from tissuejax.mesh.columns import box
 from tissuejax.recordings.recording import Geometry
 from tissuejax.tled import build, gravity, pressed, statics
@@ -159,6 +161,32 @@ def test_the_penalty_holds_where_the_law_stiffens_a_hundredfold():
     rest = {"probe.penalty": scene.probe.penalty / grown, "probe.softness": scene.probe.softness * grown}
     with pytest.raises(UnstableSimulation, match="inside the probe"):
         run(scene.put(rest | {"probe.mass": scene.probe.mass / grown}))
+
+
+def test_elements_that_fold_under_the_ball_are_not_passed_over():
+    """With little stiffness against bending the corner under the ball turns over, and the force is a quarter short of
+    that of the same mesh with more."""
+    stiff = stiffening(hourglass=3.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", CoarseMesh)
+        whole = run(stiff)
+    with pytest.warns(CoarseMesh, match=r"element \d+ near \(.*\) mm is folded by t = .*hourglass stiffness \(it was"):
+        folded = run(stiffening())
+    assert float(folded.corner) < 0 < float(whole.corner)
+    assert float(folded.force[-1, 2]) < 0.85 * float(whole.force[-1, 2])
+
+
+def test_the_corner_of_a_hex_is_folded_where_three_edges_change_sides():
+    """By hand: node 6 of a unit cube is moved inwards along the diagonal. Its three edges -e_i gain (d, d, d); at its
+    neighbours one edge is shorter by d."""
+    cube = jnp.asarray(np.array(box((1.0, 1.0, 1.0), (1, 1, 1)).points))
+    cells = box((1.0, 1.0, 1.0), (1, 1, 1)).cells[0]
+    X = cube[cells].T[:, :, None]
+    element = tissue(ReducedPolynomial(order=1), cases.NEO).body.element
+    for d in (0.0, 0.2, 0.7):
+        x = X.at[:, 6, 0].add(-d)
+        own = float(np.linalg.det(d - np.eye(3)) / np.linalg.det(-np.eye(3)))
+        assert float(element.least_corner(X, x)[0]) == pytest.approx(min(own, 1 - d), abs=1e-12)
 
 
 @pytest.mark.slow

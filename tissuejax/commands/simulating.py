@@ -14,6 +14,7 @@ from tissuejax.commands.results import Known, add_source, known
 from tissuejax.energies.catalogue import volumetric
 from tissuejax.errors import InputError
 from tissuejax.experiments.predictor import predictor
+from tissuejax.experiments.soundness import numerics, sentences
 from tissuejax.experiments.virtual import as_measured, corners, material_test, probing
 from tissuejax.fitting.scores import Score, scores
 from tissuejax.model import Model
@@ -150,6 +151,7 @@ def simulated(
         paths = write_table(recording, out, sample.recordings[name] if measured else None)
         files |= {p.stem: p for p in paths}
     notes = assumed
+    notes += sentences(numerics(predicted))
     if missing:
         own = ", ".join(missing)
         notes.append(f"{own}: a value of its own for each recording, not known here; taken as neutral")

@@ -22,6 +22,7 @@ from tissuejax.estimation.finished import Finished
 from tissuejax.estimation.series import Segment
 from tissuejax.experiments import workers
 from tissuejax.experiments.probing_predictor import ProbingPredictor
+from tissuejax.experiments.soundness import checks
 from tissuejax.model import Model
 
 # Effects compiled together (`Effect.group`). The first group is in every program; histories take long and stay apart.
@@ -46,6 +47,7 @@ class Runs:
         finite: which samples of its channel a segment holds.
         folder: where runs are kept; None keeps them in memory only.
         report: called after every batch with the number of runs done so far.
+        checks: how the runs of this process went, by what was asked for.
         count: runs done. cost: runs asked for, done or found on disk, in those of the coarse simulation.
     """
 
@@ -58,6 +60,7 @@ class Runs:
     report: Callable[[int], None] = lambda _: None
     count: int = 0
     cost: float = 0.0
+    checks: dict[tuple, dict[str, float]] = field(default_factory=dict)
     _models: dict[tuple, ProbingPredictor] = field(default_factory=dict)
 
     def __post_init__(self):
@@ -90,6 +93,8 @@ class Runs:
                     done[k] = run
                 for key, run in zip(part, done, strict=True):
                     self.finished.keep(key, self._cut(key[0], run))
+                    reach = float(self.ready[FINE].setups[key[0]].scene.pressed.shape.reach())
+                    self.checks[key] = checks(run, reach)
                 self.count += len(part)
                 self.report(self.count)
         out = []
@@ -99,6 +104,11 @@ class Runs:
                 predicted[self.rows[key[0]]] = self.finished[key]
             out.append(predicted)
         return out
+
+    def went(self, values: Mapping[str, float]) -> dict[str, dict[str, float]]:
+        """How the fine runs at these values went, by recording; without those that were found on disk."""
+        keys = {r: self._key(values, r, FINE) for r in self.rows}
+        return {r: self.checks[key] for r, key in keys.items() if key in self.checks}
 
     def _price(self, kind: str) -> float:
         """Elements times steps, of those of the coarse simulation."""

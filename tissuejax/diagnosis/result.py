@@ -31,6 +31,8 @@ class Diagnosis:
         seconds: wall time.
         proposals: what to measure next (`next_experiment.Proposal`), best first.
         maps: of probings: where each fitted recording wants the tissue stiffer or softer (`stiffness_map`).
+        numerics: of probings: how the simulations of what is shown went, by recording (`experiments.soundness.checks`).
+        experiment: the kind of the recordings ("homogeneous", "probing", "cutting").
         foreseen: of material tests: what the fitted recordings leave open in the held-out ones (`foreseen`).
     """
 
@@ -41,6 +43,8 @@ class Diagnosis:
     proposals: list = field(default_factory=list)
     maps: list = field(default_factory=list)
     foreseen: list = field(default_factory=list)
+    numerics: dict[str, dict[str, float]] = field(default_factory=dict)
+    experiment: str = "homogeneous"
 
     @property
     def search(self) -> Answered:
@@ -94,6 +98,7 @@ class Diagnosis:
             "base_parameters": self.base(),
             "interval": {"confidence": 0.95, "degrees_of_freedom": a.chosen.dof},
             "numerical_error": self._of(()).numerical,
+            **({"numerics": self.numerics} if self.numerics else {}),
             "explained": {"fitted": a.explained[0], "held_out": a.explained[1] if bench.held_out else None},
             "fitted": list(bench.fitted),
             "held_out": list(bench.held_out),

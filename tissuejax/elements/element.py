@@ -53,6 +53,21 @@ class Element(eqx.Module):
         """The same element without a short cut that holds for some shapes only."""
         return self
 
+    def least_corner(self, X: Float[Array, "3 k E"], x: Float[Array, "3 k E"]) -> Float[Array, " E"]:
+        """Least volume ratio of an element at its corners, where three edges meet: 1 undeformed, negative where the
+        element is folded, which the stress point in its middle may not feel.
+
+        Args:
+            X, x: node positions in the reference and now, m.
+        """
+        ratios = []
+        for a, here in enumerate(self.corners):
+            steps = np.sum(np.abs(self.corners - here) > 0, 1)
+            near = np.flatnonzero(steps == 1) if len(self.corners) > 4 else np.flatnonzero(steps)
+            then, now = (determinant(jnp.stack([y[:, b] - y[:, a] for b in near])) for y in (X, x))
+            ratios.append(now / then)
+        return jnp.min(jnp.stack(ratios), 0)
+
     @abc.abstractmethod
     def shape(self, xi: Float[Array, "q 3"]) -> Float[Array, "q k"]:
         """Shape functions at reference points: 1 at their own node, 0 at the others, sum 1."""

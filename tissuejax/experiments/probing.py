@@ -64,6 +64,7 @@ class Simulated(NamedTuple):
         inertia: greatest kinetic over greatest internal energy. depth: greatest penetration, m.
         pierced: -1, or the frame by which the surface was too deep in the probe (`tled.contact.PIERCED`).
         hourglass: greatest energy of the hourglass control over the greatest internal energy.
+        corner: least volume ratio at a corner of any element: 0 or less where one is folded.
         ballast: mass added to hold the step, over the mass of the body.
         displacement: of the nodes at the end, m.
     """
@@ -77,6 +78,7 @@ class Simulated(NamedTuple):
     displacement: Float[Array, "N 3"] | None = None
     pierced: Int[Array, ""] | int = -1
     hourglass: Float[Array, ""] | float = 0.0
+    corner: Float[Array, ""] | float = 1.0
 
 
 def assembled(model: Model, values: Mapping[str, Array], setup: Setup) -> tuple[Scene, Float[Array, ""]]:
@@ -145,8 +147,9 @@ def simulated(model: Model, values: Mapping[str, Array], setup: Setup) -> Simula
     poison = jnp.where(bad, jnp.nan, 0.0)  # a broken run must never look like a prediction
     read = {name: read_at(times[name], ch.time, ch.values) + poison for name, ch in channels.items()}
     return Simulated(
-        read, out.failed, out.element, out.inertia, out.depth, ballast, out.state.u.T, pierced, out.hourglass
-    )
+        read, out.failed, out.element, out.inertia, out.depth, ballast, out.state.u.T, pierced, out.hourglass,
+        out.corner,
+    )  # fmt: skip
 
 
 def _about_rest(markers: Float[Array, "n k 3"], rest: Float[Array, "k 3"], setup: Setup) -> Float[Array, "n k 3"]:

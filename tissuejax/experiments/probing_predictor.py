@@ -23,6 +23,7 @@ from tissuejax.experiments.predictor import Predictor, Tangents
 from tissuejax.experiments.probing import Simulated, simulated
 from tissuejax.experiments.probing_settings import ProbingSettings
 from tissuejax.experiments.probing_setup import Setup, retimed, setups
+from tissuejax.experiments.soundness import NUMERICS, checks
 from tissuejax.model import Model
 from tissuejax.parameters import Values
 from tissuejax.recordings.recording import Channel, Recording, Sample
@@ -163,15 +164,9 @@ class ProbingPredictor(Predictor):
             c: Channel(measured.channels[c].time, self.unpadded(name, c, v), measured.channels[c].unit)
             for c, v in run.channels.items()
         }
-        checks = {}
-        if not traced(run.depth):
-            deep = max(0.0, float(run.depth)) / float(self.setups[name].scene.pressed.shape.reach())
-            checks = {
-                "numerics/hourglass": float(run.hourglass),
-                "numerics/penetration": deep,
-                "numerics/inertia": float(run.inertia),
-            }
-        return Recording(name, measured.experiment, measured.inputs, reported, {**measured.attributes, **checks})
+        went = {} if traced(run.depth) else checks(run, float(self.setups[name].scene.pressed.shape.reach()))
+        told = {f"{NUMERICS}{check}": value for check, value in went.items()}
+        return Recording(name, measured.experiment, measured.inputs, reported, {**measured.attributes, **told})
 
     def unpadded(self, name: str, channel: str, values: Array) -> Array:
         """Values as simulated, cut to the samples (and markers) that recording and channel have."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from tissuejax.estimation.level import OF_NOTE
 from tissuejax.estimation.stability import sentence
+from tissuejax.experiments.soundness import CHECKS, sentences
 from tissuejax.fitting.memory import begun_loaded, times
 
 if TYPE_CHECKING:
@@ -18,12 +19,6 @@ SERIAL = 0.5  # lag-one correlation of residuals from which standard errors are 
 CONDITION = 1e6
 TWINS = 0.05  # of their ratio: relaxation times closer than that are one
 GROSS = 5.0  # misfit in units of the noise beyond which a fit describes something else
-COARSE = 0.05  # share from which a numerical check of a simulation is a warning
-CHECKS = {  # of a simulation: what the share is of, and what to do
-    "hourglass": ("of the strain energy is that of the hourglass control", "take a finer mesh"),
-    "penetration": ("of the probe's radius is sunk into the surface", "raise `penalty`"),
-    "inertia": ("of the strain energy is kinetic", "lower `compression`"),
-}
 
 
 def warnings_of(found: "Fit") -> list[str]:
@@ -57,7 +52,7 @@ def warnings_of(found: "Fit") -> list[str]:
             f"The noise was not recorded; it was estimated from the residuals: {text}. "
             "So chi-square says nothing on whether the model fits."
         )
-    return said + _numerics(found) + _starts(found)
+    return said + sentences(found.numerics) + _starts(found)
 
 
 def _twins(found: "Fit") -> list[str]:
@@ -73,16 +68,6 @@ def _twins(found: "Fit") -> list[str]:
                     f"({sum(found.values[p] for p in shares):.3g}). One term fewer says as much, e.g. --effect "
                     f"viscoelasticity-{len(free) - 1}."
                 )
-    return said
-
-
-def _numerics(found: "Fit") -> list[str]:
-    said = []
-    for check, (what, remedy) in CHECKS.items():
-        shares = {name: checks[check] for name, checks in found.numerics.items() if check in checks}
-        worst = max(shares, key=shares.get, default=None)
-        if worst is not None and shares[worst] > COARSE:
-            said.append(f"In the simulation of {worst} {shares[worst]:.0%} {what}: {remedy}.")
     return said
 
 

@@ -15,6 +15,7 @@ from tissuejax.energies.stability import Stability
 from tissuejax.estimation.covariance import Uncertainty
 from tissuejax.estimation.problem import Problem
 from tissuejax.estimation.solution import Limits, Solution
+from tissuejax.experiments.soundness import numerics
 from tissuejax.fitting.fingerprint import fingerprint
 from tissuejax.fitting.first import First
 from tissuejax.fitting.scores import Score
@@ -23,7 +24,6 @@ from tissuejax.parameters import under
 from tissuejax.recordings.recording import Recording
 
 FORMAT = 1
-NUMERICS = "numerics/"  # attributes of a simulated recording that say how its run went
 
 
 @dataclass(frozen=True)
@@ -136,14 +136,9 @@ class Fit(Solution):
     @property
     def numerics(self) -> dict[str, dict[str, float]]:
         """For simulated recordings, the worst of each numerical check, as shares: energy of the hourglass control over
-        internal energy, penetration over the probe's radius, kinetic over internal energy."""
-        kept = {
-            name: {k: v for k, v in r.attributes.items() if k.startswith(NUMERICS)}
-            for name, r in self.predictions.items()
-        }
-        return {
-            name: {k[len(NUMERICS) :]: float(v) for k, v in checks.items()} for name, checks in kept.items() if checks
-        }
+        internal energy, penetration over the probe's radius, kinetic over internal energy; and the least volume
+        ratio at a corner of an element, 0 or less where one is folded."""
+        return numerics(self.predictions)
 
     def record(self) -> dict:
         """The contents of result.json."""

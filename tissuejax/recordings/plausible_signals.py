@@ -179,8 +179,10 @@ def evenly(recording: Recording, key: str = "nominal_stress") -> bool:
 
 
 def filtered(recording: Recording) -> list[str]:
-    """Noise that neighbouring samples share."""
+    """Noise that neighbouring samples share, where it was not recorded."""
     load = load_of(recording)
+    if load is not None and recording.channels["nominal_stress"].noise_std:
+        return []
     if load is None or len(load) < LONG or not np.ptp(load) or not evenly(recording):
         return []
     strides = [k for k in STRIDES if 8 * k < len(load)]
@@ -193,7 +195,7 @@ def filtered(recording: Recording) -> list[str]:
         if here > FILTERED * near and after < PLATEAU * here and SEEN[0] * reach < here < SEEN[1] * reach:
             return [
                 f"neighbouring samples differ {here / near:.3g} times less than samples {k} apart: the signal was "
-                "smoothed or filtered, so a noise level estimated from neighbours is too small; give [noise]"
+                "smoothed or filtered, so its noise can't be read off neighbours; give [noise] if it is known"
             ]
     return []
 

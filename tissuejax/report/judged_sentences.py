@@ -5,6 +5,7 @@ import math
 from tissuejax.diagnosis.judgement.judge import Kind
 from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.result import USED, Diagnosis
+from tissuejax.report.track_record import sentence
 
 PARTS = {
     "law": "smooth in stretch, shared by recordings (another law)",
@@ -114,6 +115,7 @@ def sure(d: Diagnosis) -> list[str]:
     a, j, out = d.answered, d.answered.judgement, []
     chances = ", ".join(f"{k.value} {chance(p)}" for k, p in sorted(j.probabilities.items(), key=lambda kv: -kv[1]))
     out.append(f"Probabilities of the five answers: {chances}. The most probable is given.")
+    out += [text] if (text := sentence(d.experiment, a.kind.value)) else []
     present = [f"{n} {chance(p)}" for n, p in j.inclusion.items() if p > 0.01][:6]
     if present:
         out.append(f"Probability that an effect is present, over all sets weighed: {', '.join(present)}.")

@@ -27,7 +27,8 @@ BLOCK = 256  # elements at most that are taken together, in bodies of more than 
 class Mesh(NamedTuple):
     """What is computed once a run from the stress-free shape.
 
-    `cells` (k, E') and `reference` are padded with elements without volume; `mass` (N,) is lumped, kg.
+    `cells` (k, E') and `reference` are padded with elements without volume; `mass` (N,) is lumped, kg. Of elements with
+    averaged pressure the volume of a node and its mean stiffness.
     """
 
     cells: Int[Array, "k E"]
@@ -35,6 +36,7 @@ class Mesh(NamedTuple):
     stiffness: Float[Array, " E"]
     mass: Float[Array, " N"]
     nodal_volume: Float[Array, " N"] | None
+    nodal_stiffness: Float[Array, " N"] | None = None
 
 
 class History(NamedTuple):
@@ -58,8 +60,11 @@ def mesh(scene: Scene) -> Mesh:
     stiffness = jnp.concatenate([scene.stiffness, jnp.zeros(padding, body.points.dtype)])
     shares = jnp.broadcast_to(volume / k, (k, len(volume)))
     nodal_volume = add(shares, cells, len(body.points))
-    averaged = nodal_volume if body.element.averaged_pressure else None
-    return Mesh(cells, reference, stiffness, tissue.density * nodal_volume, averaged)
+    mass = tissue.density * nodal_volume
+    if not body.element.averaged_pressure:
+        return Mesh(cells, reference, stiffness, mass, None)
+    mean = add(jnp.broadcast_to(volume * stiffness / k, (k, len(volume))), cells, len(body.points)) / nodal_volume
+    return Mesh(cells, reference, stiffness, mass, nodal_volume, mean)
 
 
 def blocks(count: int) -> int:
@@ -206,17 +211,23 @@ def averaged_pressure(scene: Scene, mesh: Mesh, F) -> tuple[Float[Array, " E"], 
     J_a = sum V_e J_e / sum V_e over the elements around node a; an element takes the mean of U'(J_a) over its nodes, so
     the forces are the exact gradient of sum_a V_a U(J_a).
     """
-    tissue, V, count = scene.tissue, mesh.reference.volume, len(mesh.mass)
-    k = mesh.cells.shape[0]
-
-    def average(x):
-        shares = add(jnp.broadcast_to(V * x / k, (k, len(V))), mesh.cells, count)
-        return shares / filled(mesh.nodal_volume)
-
-    Ja, factor = average(determinant(F)), average(mesh.stiffness)
-    U, slope = jax.vjp(lambda J: factor * tissue.volumetric.energy(tissue.volumetric_values, J), Ja)
-    (pressure,) = slope(jnp.ones_like(Ja))
+    V = shares(mesh, F)
+    pressure, U = nodal_pressure(scene, mesh, add(V, mesh.cells, len(mesh.mass)))
     return take(pressure, mesh.cells).mean(0), U
+
+
+def shares(mesh: Mesh, F) -> Float[Array, "k E"]:
+    """What each element gives its nodes of its present volume, m^3."""
+    k, V = mesh.cells.shape[0], mesh.reference.volume * determinant(F)
+    return jnp.broadcast_to(V / k, (k, V.shape[-1]))
+
+
+def nodal_pressure(scene: Scene, mesh: Mesh, V: Float[Array, " N"]) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
+    """U'(J_a) and U(J_a), Pa, from the present volume at the nodes, m^3."""
+    tissue, factor = scene.tissue, filled(mesh.nodal_stiffness)
+    energy = lambda J: factor * tissue.volumetric.energy(tissue.volumetric_values, J)  # noqa: E731
+    U, slope = jax.vjp(energy, V / filled(mesh.nodal_volume))
+    return slope(jnp.ones_like(U))[0], U
 
 
 def forces(scene: Scene, mesh: Mesh, u: Float[Array, "3 N"], history: History, step):
@@ -224,12 +235,17 @@ def forces(scene: Scene, mesh: Mesh, u: Float[Array, "3 N"], history: History, s
 
     Total Lagrangian: f_a = sum_e V_e P . B_a with P = F S (Lister 2012, 4.3.1).
     """
-    loop = None if scene.body.element.averaged_pressure else native.loop(by_element, scene, mesh, history)
+    averaged = scene.body.element.averaged_pressure
+    loop = native.loop(by_element, scene, mesh, history, pressed=averaged)
     if loop is not None:
-        f, history = loop(u, step)
+        fields = ()
+        if averaged:
+            V = native.volumes(volume_shares, scene, mesh)(u)
+            fields = (nodal_pressure(scene, mesh, V)[0][None],)
+        f, history = loop(u, step, *fields)
         return barrier(f), history
     rows, count = parts(u), blocks(len(mesh.stiffness))
-    if count == 1 or scene.body.element.averaged_pressure:
+    if count == 1 or averaged:
         fe, history = contributions(scene, mesh, rows, history, step)
         return barrier(jnp.stack(barrier(tuple(add(f, mesh.cells, len(mesh.mass)) for f in fe)))), history
     size = len(mesh.stiffness) // count
@@ -260,8 +276,19 @@ def contributions(scene: Scene, mesh: Mesh, u, history: History, step) -> tuple[
     )
 
 
-def by_element(scene: Scene, mesh: Mesh, ue: Float[Array, "3 k E"], history: History, step) -> tuple[Forces, History]:
-    """`contributions` of displacements by element."""
+def volume_shares(scene: Scene, mesh: Mesh, ue: Float[Array, "3 k E"]) -> Float[Array, "k E"]:
+    """`shares` of displacements by element."""
+    return shares(mesh, scene.body.element.gradient(mesh.reference, ue)[0])
+
+
+def by_element(
+    scene: Scene, mesh: Mesh, ue: Float[Array, "3 k E"], history: History, step, pressure: Array | None = None
+) -> tuple[Forces, History]:
+    """`contributions` of displacements by element.
+
+    Args:
+        pressure: of elements with averaged pressure, at their nodes (k, E), Pa; worked out here where it is not given.
+    """
     element = scene.body.element
     shear = scene.settings.hourglass * scene.tissue.energy.initial_shear_modulus(scene.tissue.energy_values)
     F, memory = barrier(element.gradient(mesh.reference, ue))
@@ -269,7 +296,7 @@ def by_element(scene: Scene, mesh: Mesh, ue: Float[Array, "3 k E"], history: His
     S, history = barrier(stress(scene, mesh, C, history, step))
     P = first_piola(F, S)
     if element.averaged_pressure:
-        p, _ = averaged_pressure(scene, mesh, F)
+        p = averaged_pressure(scene, mesh, F)[0] if pressure is None else pressure.mean(0)
         P = P + p * cofactor(F)
     P = barrier(P)
     return barrier(element.forces(mesh.reference, P, memory, shear * mesh.stiffness)), history

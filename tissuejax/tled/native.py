@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from tissuejax.tled.lanes.library import ENVIRONMENT, NotCompiled, compiler
@@ -38,11 +39,12 @@ def wanted() -> bool:
     return os.environ.get(ENVIRONMENT, "on").lower() != "off" and compiler() is not None
 
 
-def loop(by_element: Callable, scene: "Scene", mesh: Any, history: Any) -> Callable | None:
+def loop(by_element: Callable, scene: "Scene", mesh: Any, history: Any, pressed: bool = False) -> Callable | None:
     """Forces (3, N) and new history of `u` (3, N) and the step, or None where XLA is to do it.
 
     Args:
         by_element: `internal.by_element`, of arrays whose last axis counts elements.
+        pressed: whether a pressure at the nodes (1, N) follows the step.
     """
     count, dtype = len(mesh.stiffness), mesh.stiffness.dtype
     if not wanted() or count % WIDTH or dtype not in (jnp.float32, jnp.float64):
@@ -55,12 +57,12 @@ def loop(by_element: Callable, scene: "Scene", mesh: Any, history: Any) -> Calla
         return None
     slots = [_slot(x, count) for x in leaves]
     key = (structure, tuple(slots), dtype, scene.body.element)
-    kernel = _remembered(key, lambda: _kernel(by_element, scene, mesh, structure, slots, dtype))
+    kernel = _remembered(key, lambda: _kernel(by_element, scene, mesh, structure, slots, dtype, pressed))
     if kernel is None:
         return None
 
-    def forces(u: Float[Array, "3 N"], step) -> tuple[Float[Array, "3 N"], Any]:
-        out = run(kernel, mesh.cells, [u, jnp.asarray(step, dtype), *leaves], u.shape[-1])
+    def forces(u: Float[Array, "3 N"], step, *fields: Float[Array, "c N"]) -> tuple[Float[Array, "3 N"], Any]:
+        out = run(kernel, mesh.cells, [u, jnp.asarray(step, dtype), *fields, *leaves], u.shape[-1])
         return out[0], jax.tree.unflatten(jax.tree.structure(history), out[1:])
 
     return forces
@@ -78,18 +80,44 @@ def _slot(x: Array, count: int) -> Slot:
     return Slot("lane", x.shape[:-1]) if x.ndim and x.shape[-1] == count else Slot("uniform", x.shape)
 
 
-def _kernel(by_element, scene, mesh, structure, slots, dtype) -> Kernel | None:
+def volumes(shares: Callable, scene: "Scene", mesh: Any) -> Callable:
+    """The volume at the nodes (N,), m^3, of `u` (3, N), where `loop` is to be had for the same scene.
+
+    Args:
+        shares: `internal.volume_shares`, of arrays whose last axis counts elements.
+    """
+    leaves, structure = jax.tree.flatten(mesh.reference)
+    slots = [_slot(x, len(mesh.stiffness)) for x in leaves]
+    dtype, corners = mesh.stiffness.dtype, mesh.cells.shape[0]
+
+    def one(u, *leaves):
+        part = mesh._replace(cells=np.zeros((corners, 1)), reference=jax.tree.unflatten(structure, leaves))
+        return [shares(scene, part, u)[None]]
+
+    key = ("volumes", structure, tuple(slots), dtype, scene.body.element)
+    kernel = _remembered(key, lambda: _tried(one, corners, [Slot("nodal", (3,)), *slots], ["nodal"], dtype))
+    assert kernel is not None  # the loop itself does all of this and more
+
+    def summed(u: Float[Array, "3 N"]) -> Float[Array, " N"]:
+        return run(kernel, mesh.cells, [u, *leaves], u.shape[-1])[0][0]
+
+    return summed
+
+
+def _kernel(by_element, scene, mesh, structure, slots, dtype, pressed: bool) -> Kernel | None:
     """The kernel, tried out once; None where an operation has no form in C."""
 
     def one(u, step, *leaves):
+        fields, leaves = ((leaves[0][0],), leaves[1:]) if pressed else ((), leaves)
         tissue, hourglass, reference, stiffness, history = jax.tree.unflatten(structure, leaves)
         settings = dataclasses.replace(scene.settings, hourglass=hourglass)
         here = dataclasses.replace(scene, tissue=tissue, settings=settings)
-        part = mesh._replace(cells=None, reference=reference, stiffness=stiffness, mass=None, nodal_volume=None)
-        f, history = by_element(here, part, u, history, step)
+        bare = dict(cells=None, mass=None, nodal_volume=None, nodal_stiffness=None)
+        part = mesh._replace(reference=reference, stiffness=stiffness, **bare)
+        f, history = by_element(here, part, u, history, step, *fields)
         return [jnp.stack(f), *jax.tree.leaves(history)]
 
-    ins = [Slot("nodal", (3,)), Slot("uniform", ()), *slots]
+    ins = [Slot("nodal", (3,)), Slot("uniform", ()), *([Slot("nodal", (1,))] if pressed else []), *slots]
     outs = ["nodal"] + ["lane"] * (len(jax.eval_shape(one, *_shapes(ins, mesh.cells.shape[0], dtype))) - 1)
     return _tried(one, mesh.cells.shape[0], ins, outs, dtype)
 

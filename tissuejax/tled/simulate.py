@@ -44,6 +44,7 @@ class Checks(NamedTuple):
         hourglass: energy of the hourglass control, J; more than some per cent of `internal`: too coarse.
         depth: greatest penetration into the probe at the end of any of the block's frames, m.
         failed: True where a value is not finite or an element is inverted; `element`: the worst of the finite ones.
+        corner: least volume ratio at a corner of any element; `folded`: the element that has it.
     """
 
     kinetic: Float[Array, " b"]
@@ -52,6 +53,8 @@ class Checks(NamedTuple):
     depth: Float[Array, " b"]
     failed: Array
     element: Int[Array, " b"]
+    corner: Float[Array, " b"]
+    folded: Int[Array, " b"]
 
 
 class Pace(NamedTuple):
@@ -100,6 +103,11 @@ class Outcome(eqx.Module):
     def depth(self) -> Float[Array, ""]:
         """Greatest penetration seen, m."""
         return jnp.max(self.penetration)
+
+    @property
+    def corner(self) -> Float[Array, ""]:
+        """Least volume ratio at a corner of any element, at the ends of blocks: 0 or less where one is folded."""
+        return jnp.min(self.checks.corner)
 
     @property
     def hourglass(self) -> Float[Array, ""]:
@@ -256,7 +264,10 @@ def _checks(m: Machine, state: State, deep: Float[Array, ""]) -> Checks:
     J = jnp.where(jnp.isfinite(J), J, jnp.inf)[: len(frozen.scene.body.cells)]
     worst = jnp.argmin(J)
     failed = (J[worst] <= 0) | ~jnp.isfinite(jnp.sum(v))
-    return Checks(kinetic, energy, hourglass, deep, failed, worst)
+    body = frozen.scene.body
+    X = body.points.T[:, body.cells.T]
+    corner = body.element.least_corner(X, X + u[:, body.cells.T])
+    return Checks(kinetic, energy, hourglass, deep, failed, worst, jnp.min(corner), jnp.argmin(corner))
 
 
 def _outcome(scene, felt, markers, pace, checks, length, state, ledger) -> Outcome:

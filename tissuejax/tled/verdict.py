@@ -1,11 +1,12 @@
 """What went wrong in a run, in a sentence: broken down under the probe, away from it, or gone through the surface."""
 
+import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tissuejax.arrays import Given
-from tissuejax.errors import UnstableSimulation
+from tissuejax.errors import CoarseMesh, UnstableSimulation
 from tissuejax.tled import contact
 from tissuejax.tled.scene import Scene
 from tissuejax.tled.stable import critical_steps
@@ -37,7 +38,8 @@ def _too_long(scene: Scene) -> bool:
 
 
 def check(out: "Outcome", scene: Scene) -> None:
-    """Raise `UnstableSimulation` if the run failed or the probe went through the surface (host side)."""
+    """Raise `UnstableSimulation` if the run failed or the probe went through the surface; warn (`CoarseMesh`) where
+    elements are folded under it (host side)."""
     if int(out.failed) >= 0:
         raise UnstableSimulation(_broken(out, scene))
     if scene.faces is not None:  # a blade: how far it sinks in is in the energy balance
@@ -45,6 +47,9 @@ def check(out: "Outcome", scene: Scene) -> None:
     frame = int(out.pierced(scene))
     if frame >= 0:
         raise UnstableSimulation(_pierced(out, scene, frame))
+    folded = np.flatnonzero(np.asarray(out.checks.corner) <= 0)
+    if scene.probe is not None and len(folded):
+        warnings.warn(_folded(out, scene, int(folded[0])), CoarseMesh, stacklevel=3)
 
 
 def _place(point) -> str:
@@ -107,6 +112,19 @@ def _pierced(out, scene, frame) -> str:
         f"{_place(centre)}: more than {contact.PIERCED:.0%} of its radius {1e3 * reach:.3g} mm, so the force is "
         f"too low. Give a larger penalty ({needed:.2g} Pa/m would hold it to 1 to 3 %; it was {penalty:.2g}), a "
         "finer mesh under the probe, or press less deep"
+    )
+
+
+def _folded(out, scene, block: int) -> str:
+    element = int(out.checks.folded[block])
+    place = _place(np.asarray(scene.body.points)[np.asarray(scene.body.cells)[element]].mean(0))
+    return (
+        f"element {element} near {place} is folded by t = {float(out.check_time[block]):.4g} s: edges at one of its "
+        "corners have changed sides, which the stress in its middle does not feel, so the tissue gives way without "
+        f"force and what the probe feels is too little ({float(out.hourglass):.0%} of the strain energy is that of the "
+        "hourglass control). Take a finer mesh under the probe, more hourglass stiffness (it was "
+        f"{float(scene.settings.hourglass):.2g} of the shear modulus at rest; tissue that stiffens needs its modulus "
+        "under the probe), or press less deep"
     )
 
 

@@ -44,7 +44,7 @@ class Cuts(Recorded):
         """See `Recorded.finished`."""
         q = self.question
         found.bench.warnings += strokes_to_settle(q.sample, found.bench, found)
-        return Diagnosis(q.sample.name, q.label, found, 0.0)
+        return Diagnosis(q.sample.name, q.label, found, 0.0, experiment=self.name)
 
     def report_to(self, ran: Callable[[int], None]) -> None:
         """See `Recorded.report_to`; nothing is simulated."""

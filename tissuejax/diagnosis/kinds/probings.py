@@ -17,6 +17,7 @@ from tissuejax.diagnosis.probing_map import stiffness_maps
 from tissuejax.diagnosis.probing_view import ProbingView, probing_blocks
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.estimation.discrepancy import Discrepancy
+from tissuejax.experiments.soundness import sentences
 
 # a set of effects costs seconds where predictions are simulations
 PROBING = Effort(
@@ -63,8 +64,10 @@ class Probings(Recorded):
         ideas = settling(planned)
         if found.kind != Kind.NOTHING:
             maps = stiffness_maps(bench, found.empty.values, found.empty.prediction)
+        went = bench.runs.went(bench.at(found.chosen.values))
+        bench.warnings += sentences(went)
         bench.runs.forget()
-        return Diagnosis(q.sample.name, q.label, found, 0.0, ideas, maps)
+        return Diagnosis(q.sample.name, q.label, found, 0.0, ideas, maps, numerics=went, experiment=self.name)
 
     def report_to(self, ran: Callable[[int], None]) -> None:
         """See `Recorded.report_to`."""

@@ -1,0 +1,45 @@
+"""How often answers of each kind were true in sealed cases, beside what they stated; said on every page.
+
+The numbers are those of `fits/challenge/pooled.json` ("by_answer"), of the newest sets of each kind of experiment; a
+test holds them against it.
+"""
+
+from typing import NamedTuple
+
+LEAST = 5  # answers below which a share says nothing
+
+
+class Held(NamedTuple):
+    """Answers of one kind that were graded: how many, how many were true, and what they stated on average."""
+
+    of: int
+    true: int
+    stated: float
+
+
+RECORD = {
+    "homogeneous": {
+        "ambiguous": Held(1, 0, 0.81),
+        "found": Held(78, 75, 0.94),
+        "found-in-part": Held(35, 27, 0.89),
+        "nothing-missing": Held(30, 27, 0.92),
+        "unexplained": Held(24, 19, 0.78),
+    },
+    "probing": {
+        "found": Held(16, 12, 0.94),
+        "found-in-part": Held(1, 0, 1.00),
+        "nothing-missing": Held(4, 4, 0.86),
+        "unexplained": Held(3, 3, 0.80),
+    },
+}
+
+
+def sentence(experiment: str, verdict: str) -> str:
+    """What to make of a stated probability; empty where too few answers of the kind were graded, or none."""
+    held = RECORD.get(experiment, {}).get(verdict)
+    if held is None or held.of < LEAST:
+        return ""
+    return (
+        f"In sealed cases that other simulators made, graded blind, {held.true} of {held.of} answers of this kind "
+        f"were true, where {held.stated:.2f} was stated on average."
+    )
