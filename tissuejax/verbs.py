@@ -145,7 +145,7 @@ def diagnose(
         data: a recording file or a Sample.
         energy: base model: a strain energy by name or as an object, or a Model whose effects are known to act.
         holdout: recordings to predict from a fit to the others; the last one by default. They too choose the set.
-        options: `effects` to try, `known` physics, `ogden_form`, `progress`, `effort`.
+        options: `effects` to try, `known` physics, `unread` recordings, `ogden_form`, `progress`, `effort`.
     """
     from tissuejax.diagnosis.diagnose import diagnose as run
 

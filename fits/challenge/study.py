@@ -150,9 +150,15 @@ def main(folder: Path) -> str:
             )
     told, rows = by_answer(folder)
     found["by_answer"] = told
-    lines += ["", "By the kind of answer, newest sets alone; in brackets what as many answers of the same confidence "
-              "would err by if each were true as often as it says:", "",
-              "| answers | of | stated | true (95 % interval) | calibration error (by chance) |", "|---|---|---|---|---|", *rows]  # fmt: skip
+    lines += [
+        "",
+        "By the kind of answer, newest sets alone; in brackets what as many answers of the same confidence would err "
+        "by if each were true as often as it says:",
+        "",
+        "| answers | of | stated | true (95 % interval) | calibration error (by chance) |",
+        "|---|---|---|---|---|",
+        *rows,
+    ]
     write_json(folder / "pooled.json", found)
     readme = folder / "README.md"
     text = readme.read_text()

@@ -177,6 +177,8 @@ def test_what_confidence_is_about(truth, answer, apt):
 def test_size_of_the_rest_and_what_was_tried():
     assert true_size(key(())) == pytest.approx(10.0)
     m = mark_rest("s", key(("slack",)), said("found", "slack", rest={"rms": 15.0}, sets=[{"effects": ["slack/sharp"]}]))
+    both = mark_rest("s", key(("slack",)), said("found", "slack", rest={"rms": 0.02, "unit": "1"}))
+    assert np.isnan(both.rest_over_true)  # forces and markers together are no force
     assert m.rest_over_true == pytest.approx(1.5)
     assert m.tried is True
     assert mark_rest("s", key(("slack",)), said("unexplained", sets=[{"effects": ["drift/linear"]}])).tried is False

@@ -55,8 +55,11 @@ class RestMark:
 
 
 def rest_size(result: dict) -> float:
-    """Rms of the rest that a result states, Pa; nan where it states none."""
+    """Rms of the rest that a result states, in the unit of what was measured; nan where it states none, or one over
+    forces and markers together, which no key has."""
     rest = result.get("rest")
+    if isinstance(rest, dict) and rest.get("unit") == "1":
+        return math.nan
     value = rest.get("rms") if isinstance(rest, dict) else None
     return float(value) if isinstance(value, int | float) else math.nan
 

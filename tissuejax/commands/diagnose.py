@@ -71,12 +71,20 @@ was stopped goes on where it was when the same command is given again. Material 
             help="known physics: gravity, viscoelasticity.g1=0.3; what is not given is fitted (repeat); of a cut also "
             "the tissue's constants, energy.mu=3kPa",
         )
+        parser.add_argument(
+            "--unread",
+            action="append",
+            default=[],
+            metavar="NAME",
+            help="of material tests: a recording that nothing reads until all is done, and that is predicted then "
+            "(repeat); held-out recordings choose the effects too",
+        )
         parser.add_argument("--effect", action="append", metavar="NAME", help="try only these effects (repeat)")
         add_out(parser, "out/SAMPLE-diagnosis-ENERGY")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Read, diagnose, write."""
-        sample = _only(read(given.file), given.only, given.holdout)
+        sample = _only(read(given.file), given.only, [*(given.holdout or []), *given.unread])
         out = folder(given.out, "diagnosis", sample.name, [given.energy], given.force)
         found = diagnose(
             sample,
@@ -87,6 +95,7 @@ was stopped goes on where it was when the same command is given again. Material 
             ogden_form=given.ogden_form,
             keep=out / "runs",
             known=given.known,
+            unread=given.unread,
         )
         again = _fit_with(found, sample, given)
         reply = diagnosed(found, write_diagnosis(found, out, again=again))

@@ -3,6 +3,7 @@
 import os
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -50,6 +51,7 @@ def diagnose(
     effort: Effort | None = None,
     keep: Path | None = None,
     known: Sequence[str] | Mapping[str, float] = (),
+    unread: str | Sequence[str] = (),
 ) -> Diagnosis:
     """What is missing in the model of a sample: the verdict, with everything it rests on.
 
@@ -67,6 +69,8 @@ def diagnose(
             effects of material tests (removed at the end); inside `out` by default.
         known: effects that are known to act, "gravity", "viscoelasticity.g1=0.3", or values by dotted path
             (`Diagnosis.repaired`); what is given is kept, the rest of such an effect is fitted with the base.
+        unread: of material tests, recordings that take no part in anything: neither fitted, nor in the noise, nor in
+            the choice. They are predicted when all is done (`Diagnosis.unread`).
 
     Raises:
         InputError: a file that can't be read, an unknown recording or effect, fewer samples than parameters.
@@ -76,7 +80,8 @@ def diagnose(
     jax.config.update("jax_enable_x64", True)
     keep_programs()
     make_room()
-    sample = source if isinstance(source, Sample) else read(source)
+    whole = source if isinstance(source, Sample) else read(source)
+    sample, unread = without(whole, unread)
     fitted, held_out, remarks = split(sample, holdout)
     refuse_unusable(sample, (*fitted, *held_out))
     refuse_gaps(sample, (*fitted, *held_out))
@@ -124,6 +129,7 @@ def diagnose(
             noted(f"going on: {kept.before} sets were weighed before it was stopped")
         found = answer(bench, asked.whole, cut, of, effort, noted, kept=kept)
         made = asked.finished(found)
+        made.unread = asked.predicted(whole, unread, found) if unread else {}
     if found.evidence.exhausted:
         found.bench.warnings.append(
             "what may be spent on predictions was spent: larger sets of effects were not all weighed"
@@ -140,6 +146,28 @@ def diagnose(
         write_evidence(found.evidence, evidence_file(Path(out)))
     kept.forget()
     return made
+
+
+def without(sample: Sample, unread: str | Sequence[str]) -> tuple[Sample, tuple[str, ...]]:
+    """The sample without the recordings that nothing may read, and their names.
+
+    Raises:
+        InputError: an unknown recording, none left, or recordings of another kind than material tests.
+    """
+    names = (unread,) if isinstance(unread, str) else tuple(unread)
+    for name in names:
+        if name not in sample.recordings:
+            raise unknown("recording", name, sample.recordings)
+        if experiment(sample.recordings[name].experiment).kind != "homogeneous":
+            raise InputError(
+                f"{name}: only material tests can stay unread; diagnose without it (--only), and predict it with a fit"
+            )
+    kept = {n: r for n, r in sample.recordings.items() if n not in names}
+    if not kept:
+        raise InputError(f"{sample.name}: no recording is left to read; leave at least one")
+    refuse_unusable(sample, names)
+    refuse_gaps(sample, names)
+    return (replace(sample, recordings=kept) if names else sample), names
 
 
 def _items(known: Sequence[str] | Mapping[str, float]) -> list[str]:

@@ -20,7 +20,7 @@ from tissuejax.estimation.posed import LeastSquares
 from tissuejax.estimation.reach import Reach, Whole
 from tissuejax.estimation.solution import Limits, Solution
 
-NEAR = 1e-6  # of a parameter's scale or range: what rests on its end
+ENDS = 1e-6  # of a parameter's scale or range: what rests on its end
 
 
 @dataclass(frozen=True)
@@ -142,12 +142,12 @@ class Descent(LeastSquares):
     def resting(self, x: Float[np.ndarray, " p"]) -> "Resting":
         """What of x rests on an end of its range, and what takes up its whole."""
         span = np.minimum(np.where(np.isfinite(self.high - self.low), self.high - self.low, 1.0), self.scale)
-        on = (x - self.low < NEAR * span) | (self.high - x < NEAR * span)
+        on = (x - self.low < ENDS * span) | (self.high - x < ENDS * span)
         side = np.where(x - self.low <= self.high - x, 1.0, -1.0)
         full = []
         for whole in self.wholes:
             members = np.array(whole.members)
-            if whole.excess(x) > -NEAR:
+            if whole.excess(x) > -ENDS:
                 most = members[np.argmax(x[members])]
                 full.append((int(most), members[members != most]))
                 on[most], side[most] = True, -1.0

@@ -32,6 +32,7 @@ class Diagnosis:
         proposals: what to measure next (`next_experiment.Proposal`), best first.
         maps: of probings: where each fitted recording wants the tissue stiffer or softer (`stiffness_map`).
         numerics: of probings: how the simulations of what is shown went, by recording (`experiments.soundness.checks`).
+        unread: of recordings that nothing has read: rms errors of the base and of what is shown, and the noise, SI.
         experiment: the kind of the recordings ("homogeneous", "probing", "cutting").
         foreseen: of material tests: what the fitted recordings leave open in the held-out ones (`foreseen`).
     """
@@ -45,6 +46,7 @@ class Diagnosis:
     foreseen: list = field(default_factory=list)
     numerics: dict[str, dict[str, float]] = field(default_factory=dict)
     experiment: str = "homogeneous"
+    unread: dict[str, dict[str, float]] = field(default_factory=dict)
 
     @property
     def search(self) -> Answered:
@@ -98,6 +100,7 @@ class Diagnosis:
             "base_parameters": self.base(),
             "interval": {"confidence": 0.95, "degrees_of_freedom": a.chosen.dof},
             "numerical_error": self._of(()).numerical,
+            **({"unread": self.unread} if self.unread else {}),
             **({"numerics": self.numerics} if self.numerics else {}),
             "explained": {"fitted": a.explained[0], "held_out": a.explained[1] if bench.held_out else None},
             "fitted": list(bench.fitted),

@@ -152,6 +152,11 @@ def sure(d: Diagnosis) -> list[str]:
             f"What is left jumps (excess kurtosis {rest['kurtosis']:.0f}): slips, steps or spikes are none of the "
             "smooth parts that were allowed for, and the names deserve doubt."
         )
+    for name, x in d.unread.items():
+        out.append(
+            f"{name}, which nothing has read until now: error {x['before']:.3g} Pa with {d.energy} alone, "
+            f"{x['after']:.3g} Pa with what is shown, noise {x['noise']:.3g} Pa."
+        )
     if a.bench.held_out:
         out.append(f"Which data were used: {USED}.")
     return out

@@ -1,7 +1,9 @@
 """Material tests: predictions in closed form, a discrepancy of laws, of times and of the rig's hysteresis."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import ClassVar
+
+import numpy as np
 
 from tissuejax.diagnosis.foreseen import OPEN, foreseen
 from tissuejax.diagnosis.judgement.answer import Answered
@@ -15,6 +17,7 @@ from tissuejax.diagnosis.offered import offered, paced
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.estimation.discrepancy import Discrepancy, discrepancy
 from tissuejax.estimation.sigma import sigmas
+from tissuejax.recordings.recording import Sample
 
 
 class MaterialTests(Recorded):
@@ -52,6 +55,23 @@ class MaterialTests(Recorded):
             open_ends = foreseen(found.bench, found.whitenings[keys], found.plain[keys])
             found.bench.warnings += [x.sentence(found.chosen) for x in open_ends if x.over_noise > OPEN]
         return Diagnosis(q.sample.name, q.label, found, 0.0, settling(list(planned)), [], open_ends)
+
+    def predicted(self, whole: Sample, names: Sequence[str], found: Answered) -> dict[str, dict[str, float]]:
+        """See `Recorded.predicted`: by parameters alone, those of a recording's own at neutral; Pa."""
+        q = self.question
+        sigma, _ = sigmas(whole, (*q.every, *names))
+        bench = MaterialBench.of(whole, q.energy, q.every, tuple(names), sigma, q.tried)
+        tell(bench, q.known)
+        out: dict[str, dict[str, float]] = {}
+        for label, values in (("before", found.empty.values), ("after", found.chosen.values)):
+            left = bench.y - bench.predict(values)
+            for name in names:
+                rows = bench.mask((name,))
+                out.setdefault(name, {})[label] = float(np.sqrt(np.mean(left[rows] ** 2)))
+        for name in names:
+            rows = bench.mask((name,))
+            out[name] |= {"noise": float(np.mean(bench.sigma[rows])), "n": int(np.sum(rows))}
+        return out
 
     def report_to(self, ran: Callable[[int], None]) -> None:
         """See `Recorded.report_to`; nothing is simulated."""

@@ -13,6 +13,7 @@ from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.known import Known, effects_of
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.energies.energy import Energy
+from tissuejax.errors import InputError
 from tissuejax.estimation.discrepancy import Discrepancy
 from tissuejax.recordings.recording import Sample
 
@@ -84,6 +85,14 @@ class Recorded(abc.ABC):
     @abc.abstractmethod
     def finished(self, found: Answered) -> Diagnosis:
         """The diagnosis, with what should be measured next."""
+
+    def predicted(self, whole: Sample, names: Sequence[str], found: Answered) -> dict[str, dict[str, float]]:
+        """How far recordings that nothing has read are from the base and from the fit that is shown, by name.
+
+        Args:
+            whole: the sample with them.
+        """
+        raise InputError(f"recordings of kind {self.name!r} can't stay unread; only material tests can")
 
     @abc.abstractmethod
     def report_to(self, ran: Callable[[int], None]) -> None:
