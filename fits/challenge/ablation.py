@@ -4,16 +4,17 @@ python fits/challenge/ablation.py out/rest-second     a folder that `tissuejax c
 
 Prints, per setting: effects named with nothing wrong beside them, wrong answers where no effect of the catalogue acts,
 all answers right, and the expected calibration error, as the grading of that kind of set counts them. Only folders
-whose cases are opened should be looked at so. What sets are weighed by is in their evidence already (`WEIGHED`).
+whose cases are opened should be looked at so. What sets are weighed by is in their evidence already
+(`ablation_settings.WEIGHED`).
 """
 
 import json
 import sys
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from ablation_settings import settings
 
 from tissuejax.challenge.rest_marks import mark_rest
 from tissuejax.challenge.verdicts import mark
@@ -23,27 +24,6 @@ from tissuejax.diagnosis.judgement.judge import judge
 from tissuejax.diagnosis.judgement.rejudge import verdict_of
 
 EDGES = (0.5, 0.7, 0.8, 0.9, 0.95)  # of stated probability
-# What sets are fitted and weighed by is in their evidence already: these want the diagnoses run again.
-WEIGHED = ("unknown", "shares", "strange", "sudden", "change", "rig", "shape", "misstated")
-
-
-def settings() -> Iterator[tuple[str, Criteria]]:
-    """The criteria as they are, and with one number changed, of all that a judge reads (all but `WEIGHED`)."""
-    usual = Criteria()
-    yield "as they are", usual
-    for coarse in (25.0, 50.0, 100.0, 150.0, 300.0, 1000.0, 1e9):
-        yield f"coarse {coarse:g}", replace(usual, coarse=coarse)
-    for named in (0.3, 0.4, 0.7, 0.9):
-        yield f"named from {named}", replace(usual, named=named)
-    for negligible in (0.0025, 0.01, 0.02):
-        yield f"negligible below {negligible}", replace(usual, negligible=negligible)
-    for sizes in ((0.25, 0.25, 0.25, 0.25), (0.6, 0.3, 0.08, 0.02), (0.8, 0.18, 0.018, 0.002)):
-        yield f"sizes {sizes}", replace(usual, sizes=sizes)
-    for name in ("unseen", "covered"):
-        value = getattr(usual, name)
-        for factor in (0.5, 2.0):
-            other = min(factor * value, 0.99) if isinstance(value, float) and value < 1 else type(value)(factor * value)
-            yield f"{name} {other:g}", replace(usual, **{name: other})
 
 
 def stored(folder: Path) -> dict[str, tuple[Evidence, dict]]:

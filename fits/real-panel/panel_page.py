@@ -55,8 +55,18 @@ def tables(answers: list[Answer], found: dict) -> str:
         if r["of"]:
             lines.append(f"| {name} | {r['share']:.0%} | {r['low']:.0%} to {r['high']:.0%} | {r['of']} |")
     error = found["calibration"]["expected_calibration_error"]
-    lines += ["", f"Macro-F1 over causes, nothing among them: **{found['macro_f1']:.2f}**. Expected calibration error "
-              f"{error:.2f}." if error is not None else ""]  # fmt: skip
+    chance = found["calibration"]["error_by_chance"]
+    lines += ["", f"Macro-F1 over causes, nothing among them: **{found['macro_f1']:.2f}**, and "
+              f"**{found['macro_f1_of_all_names']:.2f}** where every second name that the protocol does not allow "
+              f"counts as a false one. Expected calibration error {error:.2f}, of which so few answers would have "
+              f"{chance:.2f} by chance." if error is not None else ""]  # fmt: skip
+    lines += ["", "| answer | of | stated | right | calibration error (by chance) |", "|---|---|---|---|---|"]
+    for verdict, r in found["calibration"]["by_verdict"].items():
+        lines.append(
+            f"| {verdict} | {r['of']} | {r['stated']:.2f} | {r['share']:.2f} ({r['low']:.2f} to {r['high']:.2f}) | "
+            f"{r['expected_calibration_error']:.2f} ({r['error_by_chance']:.2f}) |"
+        )
+    lines.append("")
     s = found["seconds"]
     if s.get("of"):
         lines += [
