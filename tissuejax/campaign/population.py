@@ -23,6 +23,7 @@ from jax.scipy.stats import multivariate_normal
 from jaxtyping import Array, Bool, Float, Int
 
 from tissuejax.errors import InputError
+from tissuejax.estimation.ending import Ending
 
 WIDE = 2.0  # spreads beforehand: half-normal, this many standard deviations of the estimates
 
@@ -164,7 +165,7 @@ def estimates(rows: Mapping[str, dict], groups: Mapping[str, str] | None = None)
     used = {
         name: r
         for name, r in rows.items()
-        if r["status"] == "converged"
+        if r["status"] == Ending.CONVERGED
         and all(p["at_bound"] is None and p["std"] is not None for p in r["parameters"].values() if p["free"])
     }
     shapes = {tuple(r["correlation"]["paths"]) for r in used.values()}

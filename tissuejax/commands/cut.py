@@ -10,6 +10,7 @@ from tissuejax.commands.arguments import number
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.outputs import KEPT, add_out, folder, made
 from tissuejax.errors import InputError, unknown
+from tissuejax.estimation.ending import Ending
 from tissuejax.experiments.cutting_run import CuttingSettings
 from tissuejax.fitting.cut import along, fit_cut
 from tissuejax.fitting.cut_resolution import resolution
@@ -130,7 +131,7 @@ sum. Units can be written ("4 kPa", "0.4 mm"); plain numbers are SI.
         record |= {} if field is None else {"along": field.tolist()}
         written = write_cut(out, record, {}, sample, found, field)
         text = [*_told_fit(found), f"page     {written['page']}", f"numbers  {written['result']}"]
-        return Reply(record | {"files": written}, "\n".join(text), 0 if found.status == "converged" else 3)
+        return Reply(record | {"files": written}, "\n".join(text), 0 if found.status == Ending.CONVERGED else 3)
 
 
 _RESOLVED = (

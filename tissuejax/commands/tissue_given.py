@@ -10,6 +10,7 @@ import numpy as np
 from tissuejax import verbs
 from tissuejax.commands.arguments import add_model, values
 from tissuejax.errors import InputError
+from tissuejax.estimation.ending import Ending
 from tissuejax.experiments.homogeneous import local
 from tissuejax.experiments.probing_setup import site
 from tissuejax.mesh.cloud import lobe_of_cloud
@@ -127,7 +128,7 @@ def _model(given):
         found = {p: float(v["value"]) for p, v in record["parameters"].items()}
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as fault:
         raise InputError(f"{path}: not the result of `tissuejax fit` ({fault})") from fault
-    if record["status"] != "converged" and not given.anyway:
+    if record["status"] != Ending.CONVERGED and not given.anyway:
         raise InputError(f"{path}: the fit did not converge ({record['status']}); fit on, or say --anyway")
     return model, found
 

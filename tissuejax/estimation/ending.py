@@ -13,3 +13,4 @@ class Ending(enum.StrEnum):
     BEHIND = "given up: another start is better and this one creeps"
     BROKEN = "the misfit became infinite; take a bounded or a nearer start"
     SPENT = "no convergence"
+    LONG_STEPS = "the last steps are still long"

@@ -7,6 +7,7 @@ import numpy as np
 
 from tissuejax.effects.catalogue import effect
 from tissuejax.estimation.covariance import uncertainty
+from tissuejax.estimation.ending import Ending
 from tissuejax.experiments.cutting_layers import layer
 from tissuejax.experiments.cutting_predictor import CuttingPredictor
 from tissuejax.experiments.cutting_record import FORCE, drawn, path_of, steady
@@ -50,7 +51,7 @@ def by_balance(
     why = {STRENGTH: "the balance of energies holds no strength; fit by simulation"}
     if ONSET in free and found[ONSET] > 0.98 * p.model.declared[ONSET].upper:
         why[ENERGY] = "the force is still setting in where the record ends: a longer cut, or a simulation, tells it"
-    status, chi2 = "converged" if ended.converged else ended.reason, float(r @ r / len(r))
+    status, chi2 = Ending.CONVERGED if ended.converged else ended.reason, float(r @ r / len(r))
     said = misfit_said(chi2, posed)
     none = dict.fromkeys(free, 0.0)
     p = predictor(with_onset, sample, names)  # all of the records, also where they did not count

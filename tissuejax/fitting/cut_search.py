@@ -8,6 +8,7 @@ import numpy as np
 
 from tissuejax.errors import UnstableSimulation
 from tissuejax.estimation.descent import Ended
+from tissuejax.estimation.ending import Ending
 from tissuejax.estimation.problem import Problem
 from tissuejax.experiments.cutting_predictor import CuttingPredictor
 from tissuejax.fitting.checkpoint import Checkpoint
@@ -38,7 +39,7 @@ class End:
     def status(self) -> str:
         """ "converged", or why not."""
         if self.settled:
-            return "converged"
+            return Ending.CONVERGED
         return self.ended.reason if not self.ended.converged else "slice and estimate do not settle"
 
 

@@ -17,6 +17,7 @@ from tissuejax.errors import InputError, NotConverged
 from tissuejax.estimation.covariance import Uncertainty, uncertainty
 from tissuejax.estimation.descent import Ended
 from tissuejax.estimation.descent import descend as minimised
+from tissuejax.estimation.ending import Ending
 from tissuejax.estimation.losses import soften
 from tissuejax.estimation.methods import trust_region
 from tissuejax.estimation.posed import LeastSquares, half_square
@@ -187,7 +188,7 @@ def fit(
     bounds = {p: side for p, side in zip(problem.free, problem.box.at_bound(best.y), strict=True) if side}
     found = Fit(
         problem=problem,
-        status="converged" if best.converged else best.reason,
+        status=Ending.CONVERGED if best.converged else best.reason,
         values=values,
         uncertainty=spread,
         at_bound=bounds,

@@ -136,7 +136,7 @@ def fit_probed(
         noise_part = _noise_part(problem, x, J, r)
         spread = _with_shifts(noise_part, [np.array(list(s.values())) for s in shifts.values()])
         shown = _shown_std(problem, J, spread, fitted) | (runs.held_out_std(values, spread, held) if held else {})
-    status = "the last steps are still long" if left >= LAST else "converged" if descent.converged else descent.reason
+    status = Ending.LONG_STEPS if left >= LAST else Ending.CONVERGED if descent.converged else descent.reason
     measured = fine.sample.recordings
     std = dict(problem.noise.std)
     for name in holdout:

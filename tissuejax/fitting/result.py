@@ -13,6 +13,7 @@ from tissuejax.cache import source
 from tissuejax.energies.catalogue import forms_of, name_of
 from tissuejax.energies.stability import Stability
 from tissuejax.estimation.covariance import Uncertainty
+from tissuejax.estimation.ending import Ending
 from tissuejax.estimation.problem import Problem
 from tissuejax.estimation.solution import Limits, Solution
 from tissuejax.experiments.soundness import numerics
@@ -41,7 +42,7 @@ class Fit(Solution):
 
     Attributes:
         problem: what was solved (with the noise finally used).
-        status: "converged" or the reason why not.
+        status: how it ended (`estimation.ending.Ending`), or a sentence where a number belongs to that.
         values: all parameters, SI; the free ones at their estimates.
         uncertainty: standard errors, covariance, correlation, condition, sentences.
         at_bound: "lower" or "upper" for a free parameter that ran into a bound.
@@ -86,7 +87,7 @@ class Fit(Solution):
     @property
     def converged(self) -> bool:
         """Whether the minimisation ended by its tolerance."""
-        return self.status == "converged"
+        return self.status == Ending.CONVERGED
 
     @property
     def free(self) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from jaxtyping import Float
 
 from tissuejax.errors import InputError, UnstableSimulation
 from tissuejax.estimation.covariance import Uncertainty
+from tissuejax.estimation.ending import Ending
 from tissuejax.estimation.problem import Problem
 from tissuejax.estimation.stability import recorded_stability
 from tissuejax.experiments.predictor import predictor
@@ -75,7 +76,9 @@ def fit_stress_curve(posed: Problem, *, holdout: tuple[str, ...] = (), iteration
     said = "The stress-curve iteration gives no standard errors, and nothing tells whether another turn would help."
     return Fit(
         problem=posed,
-        status="converged" if abs(runs[-1] - runs[-2]) < 0.05 * runs[-2] else f"stopped after {iterations} iterations",
+        status=Ending.CONVERGED
+        if abs(runs[-1] - runs[-2]) < 0.05 * runs[-2]
+        else f"stopped after {iterations} iterations",
         values=values,
         uncertainty=Uncertainty(np.full(p, np.inf), unknown, unknown, np.inf, (said,)),
         at_bound={},

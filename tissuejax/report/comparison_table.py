@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from matplotlib.figure import Figure
 
+from tissuejax.estimation.ending import Ending
 from tissuejax.fitting.comparison import TELLS, Comparison, Row
 from tissuejax.report.plot import HELD, INK, MODEL, PAPER, Plot, tidy
 from tissuejax.report.scales import display
@@ -152,7 +153,7 @@ def numbers(found: Comparison) -> list[dict[str, float | str | None]]:
         | {f"RMSE fitted ({unit})": error for unit, error in r.fitted.items()}
         | {f"RMSE held out ({unit})": error for unit, error in r.held.items()}
         | {
-            "converged": int(r.status == "converged"),
+            "converged": int(r.status == Ending.CONVERGED),
             "parameters at a bound": len(_bounds(r)),
             "open directions": len(r.warnings) - len(_bounds(r)),
         }
@@ -166,7 +167,7 @@ def _bounds(row: Row) -> list[str]:
 
 def _note(row: Row) -> str:
     """What to know of a fit before taking it, briefly: its own page says it all."""
-    said = [] if row.status == "converged" else [f"not converged: {row.status}."]
+    said = [] if row.status == Ending.CONVERGED else [f"not converged: {row.status}."]
     bounds = _bounds(row)
     others = [w for w in row.warnings if w not in bounds]
     said += [f"{', '.join(bounds)}."] * bool(bounds) + others[:NOTED]

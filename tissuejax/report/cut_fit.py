@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tissuejax.estimation.ending import Ending
 from tissuejax.fitting.cut_result import ENERGY, FRICTION, ONSET, STRENGTH, CutFit
 from tissuejax.report.fit_tables import PARAMETERS
 from tissuejax.report.numbers import write_series, write_tabular
@@ -23,7 +24,7 @@ CALLED = {
 def sentences(found: CutFit) -> list[str]:
     """What was found, in units; what the record can't tell; what to take care of."""
     said = [_told(found)]
-    if found.status != "converged":
+    if found.status != Ending.CONVERGED:
         said.append(f"The fit did not converge ({found.status}); the numbers are where it stopped.")
     said += [f"{CALLED.get(p, p)}: not identified: {why}." for p, why in found.unidentified.items()]
     return said + [f"Take care: {w}." for w in found.warnings]
