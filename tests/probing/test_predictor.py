@@ -10,7 +10,7 @@ import pytest
 from tests.probing.bench import BODY, MARKERS, QUICK, VALUES, model, recording, sample
 from tissuejax.effects.catalogue import effects, suited
 from tissuejax.errors import InputError, UnstableSimulation
-from tissuejax.experiments import programs, workers
+from tissuejax.experiments import programs, soundness, workers
 from tissuejax.experiments.predictor import predictor
 from tissuejax.experiments.probing import Simulated, assembled
 from tissuejax.experiments.probing_predictor import ProbingPredictor, _linearised, _vector
@@ -242,9 +242,11 @@ def test_missing_radius_and_bad_settings():
 
 
 def test_a_prediction_tells_how_its_simulation_went(plain):
-    """Shares of the hourglass control, of penetration and of inertia; all small in this quiet probing."""
+    """Shares of the hourglass control, of penetration and of inertia, all small in this quiet probing, and how far the
+    corner of any element is from folding."""
     checks = {k.removeprefix("numerics/"): v for k, v in plain.attributes.items() if k.startswith("numerics/")}
-    assert set(checks) == {"hourglass", "penetration", "inertia"}
+    assert set(checks) == {"hourglass", "penetration", "inertia", "corner"}
+    assert 0 < checks["corner"] < 1
     assert 0 < checks["penetration"] < 0.05
     assert 0 < checks["inertia"] < 0.05
     assert checks["hourglass"] > 0
@@ -252,8 +254,10 @@ def test_a_prediction_tells_how_its_simulation_went(plain):
 
 def test_numerical_checks_above_five_per_cent_are_warnings():
     told = SimpleNamespace(numerics={"r1": {"hourglass": 0.08, "penetration": 0.01}, "r2": {"hourglass": 0.03}})
-    assert advice._numerics(told) == [
+    assert soundness.sentences(told.numerics) == [
         "In the simulation of r1 8% of the strain energy is that of the hourglass control: take a finer mesh."
     ]
+    (folded,) = soundness.sentences({"r1": {"corner": 0.2}, "r2": {"corner": -0.1}})
+    assert folded.startswith("In the simulation of r2 elements are folded")
     assert advice.numerics_sentence(told).startswith("Simulations at worst: hourglass 8.00%, penetration 1.00%")
     assert advice.numerics_sentence(SimpleNamespace(numerics={})) == ""

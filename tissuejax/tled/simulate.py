@@ -44,7 +44,8 @@ class Checks(NamedTuple):
         hourglass: energy of the hourglass control, J; more than some per cent of `internal`: too coarse.
         depth: greatest penetration into the probe at the end of any of the block's frames, m.
         failed: True where a value is not finite or an element is inverted; `element`: the worst of the finite ones.
-        corner: least volume ratio at a corner of any element; `folded`: the element that has it.
+        lost: most of its volume ratio that any element has lost at a corner: 1 and more where it is folded, 0 in blocks
+            that were not run; `folded`: that element.
     """
 
     kinetic: Float[Array, " b"]
@@ -53,7 +54,7 @@ class Checks(NamedTuple):
     depth: Float[Array, " b"]
     failed: Array
     element: Int[Array, " b"]
-    corner: Float[Array, " b"]
+    lost: Float[Array, " b"]
     folded: Int[Array, " b"]
 
 
@@ -107,7 +108,7 @@ class Outcome(eqx.Module):
     @property
     def corner(self) -> Float[Array, ""]:
         """Least volume ratio at a corner of any element, at the ends of blocks: 0 or less where one is folded."""
-        return jnp.min(self.checks.corner)
+        return 1 - jnp.max(self.checks.lost)
 
     @property
     def hourglass(self) -> Float[Array, ""]:
@@ -267,7 +268,7 @@ def _checks(m: Machine, state: State, deep: Float[Array, ""]) -> Checks:
     body = frozen.scene.body
     X = body.points.T[:, body.cells.T]
     corner = body.element.least_corner(X, X + u[:, body.cells.T])
-    return Checks(kinetic, energy, hourglass, deep, failed, worst, jnp.min(corner), jnp.argmin(corner))
+    return Checks(kinetic, energy, hourglass, deep, failed, worst, 1 - jnp.min(corner), jnp.argmin(corner))
 
 
 def _outcome(scene, felt, markers, pace, checks, length, state, ledger) -> Outcome:

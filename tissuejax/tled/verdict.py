@@ -47,7 +47,7 @@ def check(out: "Outcome", scene: Scene) -> None:
     frame = int(out.pierced(scene))
     if frame >= 0:
         raise UnstableSimulation(_pierced(out, scene, frame))
-    folded = np.flatnonzero(np.asarray(out.checks.corner) <= 0)
+    folded = np.flatnonzero(np.asarray(out.checks.lost) >= 1)
     if scene.probe is not None and len(folded):
         warnings.warn(_folded(out, scene, int(folded[0])), CoarseMesh, stacklevel=3)
 
