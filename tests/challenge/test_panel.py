@@ -2,10 +2,11 @@
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from tissuejax.challenge.panel import Cause, answered, calibration, confusion, macro_f1, read_causes, summary
+from tissuejax.challenge.panel import Cause, answered, calibration, confusion, macro_f1, names_f1, read_causes, summary
 from tissuejax.errors import InputError
 
 CAUSES = Path(__file__).parents[2] / "fits" / "real-panel" / "causes.toml"
@@ -96,3 +97,25 @@ def test_a_null_that_expects_a_cause_is_refused(tmp_path):
     )
     with pytest.raises(InputError, match="a null expects nothing"):
         read_causes(path)
+
+
+def test_by_verdict_and_by_chance():
+    """One answer that states p misses by |p - 1| or p: on average 2 p (1 - p) if it is true as often as it says."""
+    made = SimpleNamespace(verdict="found", confidence=0.8, apt=True)
+    other = SimpleNamespace(verdict="unexplained", confidence=0.6, apt=False)
+    found = calibration([made, other])
+    assert set(found["by_verdict"]) == {"found", "unexplained"}
+    own = found["by_verdict"]["found"]
+    assert (own["of"], own["share"], own["stated"]) == (1, 1.0, 0.8)
+    assert own["expected_calibration_error"] == pytest.approx(0.2)
+    assert own["error_by_chance"] == pytest.approx(2 * 0.8 * 0.2, abs=0.03)
+    assert found["expected_calibration_error"] == pytest.approx((0.2 + 0.6) / 2)
+
+
+def test_a_second_name_counts_against_the_cause_that_it_is():
+    """Two samples: a is named alone (one right, one false from the other), b with a wrong a beside it."""
+    causes = {n: Cause(n, n, False, (frozenset({n}),), frozenset()) for n in ("a", "b")}
+    alone = answered(causes["a"], {"verdict": "found", "effects": [{"name": "a"}]})
+    both = answered(causes["b"], {"verdict": "found", "effects": [{"name": "b"}, {"name": "a"}]})
+    assert names_f1([alone, both]) == pytest.approx((2 / 3 + 1) / 2)
+    assert names_f1([alone]) == 1.0
