@@ -8,7 +8,7 @@ import pytest
 from tissuejax.challenge.files import read_keys, read_manifest
 from tissuejax.challenge.grade import grade, rate
 from tissuejax.challenge.make import make
-from tissuejax.challenge.material_cases import CATEGORIES, category, correlated, draw
+from tissuejax.challenge.material_cases import CATEGORIES, category, draw
 from tissuejax.challenge.menu import NAMES, STRAY
 from tissuejax.challenge.run import run
 from tissuejax.errors import InputError
@@ -37,22 +37,6 @@ def test_nothing_missing_leaves_noise_only():
     case = draw("x", 3, 0, "none")
     assert case.key["all_over_noise"] == pytest.approx(0.0, abs=1e-8)
     assert case.key["effects"] == []
-
-
-def test_correlated_noise_has_the_recorded_marginal_deviation(rng):
-    e = correlated(rng, np.arange(200_000) * 0.04, 0.9)
-    assert np.std(e) == pytest.approx(1.0, abs=0.03)
-    assert np.corrcoef(e[1:], e[:-1])[0, 1] == pytest.approx(0.9, abs=0.01)
-
-
-def test_correlation_is_told_in_seconds(rng):
-    """At 12.5 Hz neighbours are as alike as every second sample at 25 Hz; far apart they know nothing of each other."""
-    slow = correlated(rng, np.arange(200_000) * 0.08, 0.9)
-    assert np.corrcoef(slow[1:], slow[:-1])[0, 1] == pytest.approx(0.81, abs=0.01)
-    uneven = correlated(rng, np.cumsum(np.tile([0.04, 0.4], 50_000)), 0.9)
-    assert np.std(uneven) == pytest.approx(1.0, abs=0.03)
-    assert np.corrcoef(uneven[0::2], uneven[1::2])[0, 1] == pytest.approx(0.9**10, abs=0.02)
-    assert np.corrcoef(uneven[2::2], uneven[1:-1:2])[0, 1] == pytest.approx(0.9, abs=0.01)
 
 
 def test_categories_keep_their_shares():

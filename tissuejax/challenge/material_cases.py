@@ -1,19 +1,18 @@
 """Draws whole material-test cases: body, recordings, effects at chosen sizes, noise. A seed gives the same case."""
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
-from scipy.signal import lfilter
 
 from tissuejax.challenge.material import Ingredient, Specimen, reported
 from tissuejax.challenge.menu import CATALOGUED, NAMES, STRAY, Choice, Setting
 from tissuejax.challenge.protocols import trials
+from tissuejax.challenge.sensor_noise import STEP, chain
 from tissuejax.challenge.specimen import Trial
 from tissuejax.challenge.strain_laws import Body
 from tissuejax.challenge.strengths import beyond, reach
 from tissuejax.errors import NotConverged
 
-STEP = 0.04  # s, over which a correlation is told
 CATEGORIES = ("none", "one", "two", "three", "unknown")
 SHARES = (0.20, 0.45, 0.14, 0.06, 0.15)
 NOTHING = 1e-3  # size over noise: the told energy has that very term
@@ -46,21 +45,6 @@ def category(index: int) -> str:
     """Category of the case with this number: fixed shares, spread evenly over the numbers."""
     grid = (index * 0.6180339887498949) % 1.0
     return CATEGORIES[int(np.searchsorted(np.cumsum(SHARES), grid, side="right"))]
-
-
-def correlated(rng: np.random.Generator, time: np.ndarray, rho: float) -> np.ndarray:
-    """Noise of unit variance at `time` (s) whose correlation over `STEP` is rho, white at rho = 0.
-
-    A sensor's noise lives in seconds: samples further apart are less alike, rho^(dt/STEP).
-    """
-    white = rng.standard_normal(len(time))
-    keep = rho ** (np.diff(time) / STEP) if rho > 0 else np.zeros(len(time) - 1)
-    white[1:] *= np.sqrt(1 - keep**2)
-    if np.allclose(keep, keep[:1]):
-        return lfilter([1.0], [1.0, -float(keep[0])], white)
-    for k, a in enumerate(keep):
-        white[k + 1] += a * white[k]
-    return white
 
 
 def body(rng: np.random.Generator) -> tuple[Body, str]:
@@ -129,12 +113,13 @@ def _draw(name: str, rng: np.random.Generator, kind: str, turn: int) -> Case:
     clean = [reported(Specimen(base), t) for t in plan]
     top = max(float(np.abs(c).max()) for c in clean)
     noise = float(f"{top * np.exp(rng.uniform(np.log(0.004), np.log(0.012))):.3g}")
-    rho = float(rng.uniform(0.5, 0.95)) if rng.random() < 0.4 else 0.0
-    setting = Setting(base, plan, noise, top)
+    sensor = chain(rng)
+    stated = noise * sensor.level
+    setting = Setting(base, plan, stated, top)
     fitted = plan[:-1]
 
     def size(specimen: Specimen) -> float:
-        return beyond(energy, fitted, [reported(specimen, t) for t in fitted], noise)
+        return beyond(energy, fitted, [reported(specimen, t) for t in fitted], stated)
 
     added, sizes = [], {}
     low, high = (1.5, 30.0) if kind == "unknown" else (0.5, 30.0) if kind == "one" else (1.5, 25.0)
@@ -157,11 +142,11 @@ def _draw(name: str, rng: np.random.Generator, kind: str, turn: int) -> Case:
         tolerated = ["energy-form"]
     specimen = Specimen(base, tuple(added))
     truth = [reported(specimen, t) for t in plan]
-    noises = [
-        np.stack([correlated(rng, t.time, rho) for _ in range(x[:1].size)], -1).reshape(x.shape)
+    stress = {
+        t.name: np.stack([sensor.read(rng, t.time, c, noise) for c in x.reshape(len(x), -1).T], -1).reshape(x.shape)
         for t, x in zip(plan, truth)
-    ]
-    stress = {t.name: x + noise * e for t, x, e in zip(plan, truth, noises)}
+    }
+    errors = {t.name: (stress[t.name] - x) / stated for t, x in zip(plan, truth)}
     key = {
         "category": kind,
         "effects": [c.name for c in picked],
@@ -172,8 +157,8 @@ def _draw(name: str, rng: np.random.Generator, kind: str, turn: int) -> Case:
         "size_over_noise": sizes,
         "all_over_noise": size(specimen),
         "base": {"energy": energy, **base.terms},
-        "noise": {"std": noise, "correlation": rho, "over": STEP},
-        "truth_error_over_noise": {t.name: float(np.sqrt(np.mean(e**2))) for t, e in zip(plan, noises)},
+        "noise": {"std": stated, "over": STEP, **asdict(sensor)},
+        "truth_error_over_noise": {name: float(np.sqrt(np.mean(e**2))) for name, e in errors.items()},
         "held_out": plan[-1].name,
     }
-    return Case(name, energy, plan, stress, noise, key)
+    return Case(name, energy, plan, stress, stated, key)

@@ -137,7 +137,7 @@ def mark(name: str, key: dict, result: dict, seconds: float = math.nan) -> Mark:
         size=min(sizes) if sizes else math.nan,
         plain=plain,
         member=all(key["member"].values()) if "member" in key else None,
-        correlated=key.get("noise", {}).get("correlation", 0.0) > 0,
+        correlated=any(key.get("noise", {}).get(k, 0.0) > 0 for k in ("correlation", "corner")),
         first=settled and bool(named) and named[0] in truth,
         exact=exact,
         all_named=settled and bool(truth) and set(truth) <= set(named),
