@@ -1,4 +1,4 @@
-"""What a sensor adds to a true stress: white noise, correlated noise, noise behind a filter, or rounding to whole steps."""
+"""What a sensor adds to a true stress: noise, white, correlated or behind a filter, and rounding to whole steps."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ class Chain:
 
     @property
     def level(self) -> float:
-        """Standard deviation of all that it adds, rounding too (as if uniform: Bennett 1948), over that of the noise."""
+        """Standard deviation of all that it adds, rounding too (uniform: Bennett 1948), over that of the noise."""
         return float(np.sqrt(1 + self.rounding**2 / 12))
 
     def read(
