@@ -108,6 +108,34 @@ def test_an_effect_that_rests_at_neutral_does_not_count():
     assert j.kind is Kind.NOTHING
 
 
+def test_evidence_of_simulations_may_be_about_nothing_and_then_what_was_held_beforehand_stands():
+    """By hand: overwhelming evidence for slack, one of three effects; with probability 0.2 it says nothing."""
+    sets = evidence(weighed([], 0.0), weighed(["slack"], 500.0))
+    j = judge(dataclasses.replace(sets, simulated=True), Criteria(lapse=0.2))
+    exactly = 0.8 + 0.2 * 0.4 / 3
+    with_slack = 0.8 + 0.2 * (0.4 / 3 + 0.15 * 2 / 3 + 0.05)
+    expected = {
+        Kind.FOUND: exactly,
+        Kind.IN_PART: with_slack - exactly,
+        Kind.AMBIGUOUS: 0.8 + 0.2 * 0.6 - with_slack,
+        Kind.NOTHING: 0.2 * 0.4,
+        Kind.UNEXPLAINED: 0.0,
+    }
+    assert j.probabilities == pytest.approx(expected, abs=1e-9)
+    assert j.inclusion == pytest.approx({"slack": with_slack, "relaxation": 0.2 * 0.85 / 3, "drift": 0.2 * 0.85 / 3})
+    assert judge(sets, Criteria(lapse=0.2)).confidence == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_no_other_verdict_has_a_larger_stated_probability_where_evidence_may_lapse(seed):
+    rng = np.random.default_rng(seed)
+    sets = [weighed(n, rng.normal(0, 4), 10 ** rng.uniform(-7, -2)) for n in ([], ["relaxation"], ["slack"], ["drift"])]
+    j = judge(dataclasses.replace(evidence(*sets), simulated=True))
+    assert j.confidence == max(j.probabilities.values())
+    assert sum(j.probabilities.values()) == pytest.approx(1.0)
+    assert sum(j.posterior.values()) < 1.0
+
+
 def test_evidence_comes_back_from_its_file_and_gives_the_same_verdict(tmp_path):
     sets = evidence(weighed([], 0.0), weighed(["slack"], 2.0), weighed(["slack", "drift"], -1.0))
     again = read_evidence(write_evidence(sets, tmp_path / "evidence.json"))

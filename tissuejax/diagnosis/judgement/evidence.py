@@ -65,6 +65,7 @@ class Evidence:
         forms: by name, how many forms of it were offered (each effect's prior is shared among its forms).
         fitted, held_out: recordings; all of them are measurements for the evidence.
         exhausted: whether sets were left untried because the budget was spent.
+        simulated: whether every prediction is a simulation, so that a search makes few (probings).
     """
 
     sets: tuple[SetEvidence, ...]
@@ -72,6 +73,7 @@ class Evidence:
     fitted: tuple[str, ...]
     held_out: tuple[str, ...]
     exhausted: bool = False
+    simulated: bool = False
 
     def as_dict(self) -> dict:
         """For `evidence.json`."""
@@ -89,7 +91,12 @@ def read_evidence(path: Path) -> Evidence:
         tuples = {"keys", "names", "at_bound", "rest"}
         sets = [SetEvidence(**{k: tuple(v) if k in tuples else v for k, v in s.items()}) for s in given["sets"]]
         return Evidence(
-            tuple(sets), given["forms"], tuple(given["fitted"]), tuple(given["held_out"]), given["exhausted"]
+            tuple(sets),
+            given["forms"],
+            tuple(given["fitted"]),
+            tuple(given["held_out"]),
+            given["exhausted"],
+            given.get("simulated", False),  # unknown to files of before it was asked
         )
     except (OSError, KeyError, TypeError, json.JSONDecodeError) as error:
         raise InputError(

@@ -147,7 +147,7 @@ class Exploration:
     def evidence(self, fitted: tuple[str, ...], held_out: tuple[str, ...]) -> Evidence:
         """All of it as plain numbers."""
         sets = tuple(w.evidence for w in self.weighed.values())
-        return Evidence(sets, self.forms, fitted, held_out, self.exhausted)
+        return Evidence(sets, self.forms, fitted, held_out, self.exhausted, self.bench.costly)
 
     def weigh(self, order: Sequence[str], starts: Sequence[Mapping[str, float]], **options) -> Weighed | None:
         """Weigh a set from the best of several starts; remembered. None if there is nothing left to spend."""

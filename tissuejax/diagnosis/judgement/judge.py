@@ -11,6 +11,10 @@ five answers divide what may be true:
 - ambiguous: effects of the catalogue, but not those named.
 
 Their probabilities add up to one and the most probable is given.
+
+Where every prediction is a simulation and sets are searched with few of them, evidence may be about nothing: the search
+missed, or the simulation errs as no part of the discrepancy does. With probability `Criteria.lapse` it says nothing,
+and what was held for probable beforehand stands: a mixture, so that no answer is stated surer than such evidence can be.
 """
 
 import enum
@@ -55,7 +59,8 @@ class Judgement:
         exact: probability that exactly the effects named are present.
         chosen: the set whose fit is shown: of the answer, or the best attempt.
         alternatives: named sets beside the chosen one, with their probabilities, most probable first.
-        posterior: by set of names ("" for none), its probability.
+        posterior: by set of names ("" for none) of those that were weighed, its probability; sets that were never
+            tried have what is wanting to one.
         negligible: probability that what the chosen set leaves is negligible.
     """
 
@@ -74,6 +79,34 @@ class Judgement:
     def confidence(self) -> float:
         """Probability of the answer given."""
         return self.probabilities[self.kind]
+
+
+@dataclass(frozen=True)
+class Beforehand:
+    """What is held for probable before a recording is seen.
+
+    Attributes:
+        sizes: probability that so many effects act.
+        forms: how many effects are offered.
+    """
+
+    sizes: tuple[float, ...]
+    forms: int
+
+    @classmethod
+    def of(cls, forms: int, criteria: Criteria) -> "Beforehand":
+        """With so many effects offered; more than there are can't act."""
+        possible = criteria.sizes[: forms + 1]
+        return cls(tuple(x / sum(possible) for x in possible), forms)
+
+    def exactly(self, size: int) -> float:
+        """Probability of one set of so many effects."""
+        return self.sizes[size] / math.comb(self.forms, size) if size < len(self.sizes) else 0.0
+
+    def with_all(self, size: int) -> float:
+        """Probability that these so many effects act, beside whatever others."""
+        of = self.forms
+        return sum(x * math.comb(of - size, k - size) / math.comb(of, k) for k, x in enumerate(self.sizes) if k >= size)
 
 
 def log_prior(s: SetEvidence, forms: Mapping[str, int], criteria: Criteria) -> float:
@@ -106,19 +139,27 @@ def judge(evidence: Evidence, criteria: Criteria | None = None) -> Judgement:
         groups.setdefault(frozenset(s.names), []).append((weight, s))
     weights = {k: float(logsumexp([w for w, _ in rows])) for k, rows in groups.items()}
     whole = float(logsumexp(list(weights.values())))
-    p = {k: math.exp(w - whole) for k, w in weights.items()}
+    sound = {k: math.exp(w - whole) for k, w in weights.items()}
     best = {k: max(rows, key=lambda r: r[0])[1] for k, rows in groups.items()}
     empty = frozenset()
-    named = [k for k in p if k != empty]
-    inclusion = {n: sum(p[k] for k in named if n in k) for n in evidence.forms}
+    named = [k for k in sound if k != empty]
+    lapse = criteria.lapse if evidence.simulated else 0.0
+    before = Beforehand.of(len(evidence.forms), criteria)
+
+    def mixed(sound: float, before: float) -> float:
+        return (1 - lapse) * sound + lapse * before
+
+    p = {k: mixed(x, before.exactly(len(k))) for k, x in sound.items()}
+    inclusion = {n: mixed(sum(sound[k] for k in named if n in k), before.with_all(1)) for n in evidence.forms}
     stated = frozenset(n for n, x in inclusion.items() if x > criteria.named)
-    with_them = sum(p[k] for k in named if stated and stated <= k)
+    something = mixed(sum(sound[k] for k in named), 1 - before.exactly(0))
+    with_them = mixed(sum(sound[k] for k in named if stated <= k), before.with_all(len(stated))) if stated else 0.0
     quiet = {k: negligible(best[k], criteria) for k in p}
     exact = p.get(stated, 0.0) if stated else 0.0
     chances = {
         Kind.NOTHING: p.get(empty, 0.0) * quiet.get(empty, 0.0),
         Kind.FOUND: exact * quiet.get(stated, 0.0) if stated else 0.0,
-        Kind.AMBIGUOUS: sum(p[k] for k in named) - with_them,
+        Kind.AMBIGUOUS: something - with_them,
         Kind.UNEXPLAINED: p.get(empty, 0.0) * (1 - quiet.get(empty, 0.0)),
     }
     chances[Kind.IN_PART] = max(1.0 - sum(chances.values()), 0.0)
