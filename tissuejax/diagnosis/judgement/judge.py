@@ -14,7 +14,7 @@ Their probabilities add up to one and the most probable is given.
 
 Where every prediction is a simulation and sets are searched with few of them, evidence may be about nothing: the search
 missed, or the simulation errs as no part of the discrepancy does. With probability `Criteria.lapse` it says nothing,
-and what was held for probable beforehand stands: a mixture, so that no answer is stated surer than such evidence can be.
+and what was held for probable beforehand stands: a mixture, no surer than such evidence can be.
 """
 
 import enum
