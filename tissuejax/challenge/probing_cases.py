@@ -11,12 +11,12 @@ from threadpoolctl import threadpool_limits
 
 from tissuejax.challenge.lobe import Lobe, uniform
 from tissuejax.challenge.material import Ingredient
-from tissuejax.challenge.material_cases import correlated
 from tissuejax.challenge.probe_paths import draw as draw_path
 from tissuejax.challenge.probing_bench import MESH, Record, record
 from tissuejax.challenge.probing_menu import CATALOGUED, LOUD, STRAY, Course
 from tissuejax.challenge.probing_rest import beside
 from tissuejax.challenge.rest_cases import category as rest_category
+from tissuejax.challenge.sensor_noise import correlated
 from tissuejax.challenge.solid import Tissue
 from tissuejax.errors import NotConverged
 from tissuejax.storage import replacing
