@@ -7,7 +7,7 @@ from tissuejax.challenge import probing_cases
 from tissuejax.challenge.lobe import Lobe
 from tissuejax.challenge.material import Ingredient
 from tissuejax.challenge.probe_paths import Path, over
-from tissuejax.challenge.probing_bench import Record, record
+from tissuejax.challenge.probing_bench import Record, Setup, Visit, record
 from tissuejax.challenge.probing_menu import CATALOGUED, LOUD
 from tissuejax.challenge.solid import Tissue
 
@@ -26,8 +26,8 @@ def told():
     def of(*effects: Ingredient):
         places = [(0.3, 0.2), (-0.2, 0.4)]
         site = (0.0, 0.0)
-        body = LOBE, Tissue(600.0, 300.0, 2e4), list(effects), path, site, [site], RADIUS, places
-        return record(*body, 0, (100.0, 400.0), 0.0, (5, 5, 3), solved)
+        setup = Setup(LOBE, Tissue(600.0, 300.0, 2e4), [site], RADIUS, places, (5, 5, 3))
+        return record(setup, Visit(0, path, (100.0, 400.0)), list(effects), solved)
 
     return of, solved
 

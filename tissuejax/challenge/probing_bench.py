@@ -58,39 +58,56 @@ class Record:
     markers: Float[np.ndarray, "m k 3"]
 
 
-def record(
-    lobe: Lobe,
-    tissue: Tissue,
-    ingredients: list[Ingredient],
-    path: Path,
-    site: tuple[float, float],
-    sites: list[tuple[float, float]],
-    radius: float,
-    places: list[tuple[float, float]],
-    number: int,
-    clock: tuple[float, float],
-    phase: float,
-    mesh: tuple[int, int, int] = MESH,
-    solved: dict | None = None,
-) -> Record:
+@dataclass(frozen=True)
+class Setup:
+    """What all recordings of a case share.
+
+    Attributes:
+        sites: place under the probe in each recording, m.
+        radius: of the tip, m.
+        places: surface parameters of the markers.
+        mesh: hexes along each direction.
+    """
+
+    lobe: Lobe
+    tissue: Tissue
+    sites: list[tuple[float, float]]
+    radius: float
+    places: list[tuple[float, float]]
+    mesh: tuple[int, int, int] = MESH
+
+
+@dataclass(frozen=True)
+class Visit:
+    """One recording to be made.
+
+    Attributes:
+        number: of the recording, from 0.
+        path: of the probe.
+        clock: start of this recording and of the last one, s.
+        phase: of a moving support in this recording.
+    """
+
+    number: int
+    path: Path
+    clock: tuple[float, float]
+    phase: float = 0.0
+
+
+def record(setup: Setup, visit: Visit, ingredients: list[Ingredient], solved: dict | None = None) -> Record:
     """Solve one recording without noise.
 
     Args:
-        site: place under the probe, m; `sites` those of all recordings.
-        places: surface parameters of the markers.
-        number: of the recording, from 0.
-        clock: start of this recording and of the last one, s.
-        phase: of a moving support in this recording.
-        mesh: hexes along each direction.
         solved: what was solved before for the same paths: effects that only sensors feel find it there.
     """
+    lobe, radius, places, path, clock = setup.lobe, setup.radius, setup.places, visit.path, visit.clock
     have = {i.name: i for i in ingredients}
-    support = supported(have, path, phase)
+    support = supported(have, path, visit.phase)
     offset = np.zeros(3)
     if "registration" in have:
         offset[:2] = have["registration"].amount * np.array(have["registration"].shape["way"])
     if "contact-offset" in have:
-        offset[2] = have["contact-offset"].amount * have["contact-offset"].shape["signs"][number]
+        offset[2] = have["contact-offset"].amount * have["contact-offset"].shape["signs"][visit.number]
 
     def motion(t: np.ndarray) -> np.ndarray:
         return path.at(t) + offset - support(t)
@@ -99,13 +116,13 @@ def record(
     every = 0.12 if "periodic" in have else 0.8 if history else None
     at, pieces = stops(path, motion, lobe, radius, 0.7 * STRIDE if history else STRIDE, every)
     solved = {} if solved is None else solved
-    same = number, tuple((i.name, i.amount) for i in ingredients if i.name not in SENSED)
+    same = visit.number, tuple((i.name, i.amount) for i in ingredients if i.name not in SENSED)
     if same not in solved:
         where = motion(at)
         close = gap(lobe, where, radius) < (1e-3 if "adhesion" in have else 1e-4)
         force, moved = np.zeros((len(at), 3)), np.zeros((len(at), len(places), 3))
         if close.any():
-            bench, watch = assembled(lobe, tissue, have, site, sites, radius, places, motion(path.time), mesh)
+            bench, watch = assembled(setup, visit, have, motion(path.time))
             force[close], moved[close] = bench.follow(at[close], where[close], watch)
         solved[same] = force, moved
     force, moved = solved[same]
@@ -119,7 +136,7 @@ def record(
     probe = path.at(time)
     if "machine-compliance" in have:  # the tip went where it went; the actuator had to go further by c F
         probe = probe - have["machine-compliance"].amount * between(pieces, at, force, time)
-    return Record(f"r{number + 1}", float(clock[0]), radius, time, probe, ft, felt, mt, shown)
+    return Record(f"r{visit.number + 1}", float(clock[0]), radius, time, probe, ft, felt, mt, shown)
 
 
 def supported(have: dict[str, Ingredient], path: Path, phase: float) -> Callable[[np.ndarray], np.ndarray]:
@@ -141,8 +158,15 @@ def supported(have: dict[str, Ingredient], path: Path, phase: float) -> Callable
     return support
 
 
-def assembled(lobe, tissue, have, site, sites, radius, places, way, mesh) -> tuple[Bench, Callable]:
-    """The bench of one recording and the function that reads the markers' displacements."""
+def assembled(
+    setup: Setup, visit: Visit, have: dict[str, Ingredient], way: Float[np.ndarray, "c 3"]
+) -> tuple[Bench, Callable]:
+    """The bench of one recording and the function that reads the markers' displacements.
+
+    Args:
+        way: corners of the tip's path relative to the body, m.
+    """
+    lobe, tissue, radius, sites = setup.lobe, setup.tissue, setup.radius, setup.sites
     if "viscoelasticity" in have:
         i = have["viscoelasticity"]
         split = i.shape["split"]
@@ -153,7 +177,9 @@ def assembled(lobe, tissue, have, site, sites, radius, places, way, mesh) -> tup
         tissue = replace(tissue, C30=have["energy-form"].amount)
     if "anisotropy" in have:
         tissue = replace(tissue, fibre=have["anisotropy"].amount, along=tuple(have["anisotropy"].shape["along"]))
-    grid = graded(lobe, lobe.parameters(*site), *mesh, fine=FINE if radius > SMALL else FINER, reach=REACH)
+    grid = graded(
+        lobe, lobe.parameters(*sites[visit.number]), *setup.mesh, fine=FINE if radius > SMALL else FINER, reach=REACH
+    )
     solid = Solid(grid, tissue)
     if "inclusion" in have:
         i = have["inclusion"]
@@ -171,7 +197,7 @@ def assembled(lobe, tissue, have, site, sites, radius, places, way, mesh) -> tup
         sphere.pull, sphere.range = have["adhesion"].amount, have["adhesion"].shape["range"]
     bed = Bed(have["base-slip"].amount) if "base-slip" in have else Bed()
     skin = Membrane(grid, have["capsule"].amount) if "capsule" in have else None
-    weights = [grid.on_top(*p) for p in places]
+    weights = [grid.on_top(*p) for p in setup.places]
 
     def watch(u: np.ndarray) -> np.ndarray:
         return np.array([w @ u[nodes] for nodes, w in weights])

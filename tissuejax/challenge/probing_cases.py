@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 from tissuejax.challenge.lobe import Lobe, uniform
 from tissuejax.challenge.material import Ingredient
 from tissuejax.challenge.probe_paths import draw as draw_path
-from tissuejax.challenge.probing_bench import MESH, Record, record
+from tissuejax.challenge.probing_bench import MESH, Record, Setup, Visit, record
 from tissuejax.challenge.probing_menu import CATALOGUED, LOUD, STRAY, Course
 from tissuejax.challenge.probing_rest import beside
 from tissuejax.challenge.rest_cases import category as rest_category
@@ -155,28 +155,11 @@ def _draw(
     noise = (0.003, float(np.round(rng.uniform(50e-6, 85e-6), 6)))
     rho = float(rng.uniform(0.4, 0.85)) if rng.random() < 0.3 else 0.0
 
-    solved: dict = {}
+    setup, solved = Setup(lobe, tissue, sites, radius, places, mesh), {}
+    visits = [Visit(i, paths[i], (float(starts[i]), float(starts[-1])), float(phases[i])) for i in range(3)]
 
     def recorded(ingredients: list[Ingredient], count: int = 3) -> list[Record]:
-        clocks = [(start, starts[-1]) for start in starts]
-        return [
-            record(
-                lobe,
-                tissue,
-                ingredients,
-                paths[i],
-                sites[i],
-                sites,
-                radius,
-                places,
-                i,
-                clocks[i],
-                phases[i],
-                mesh,
-                solved,
-            )
-            for i in range(count)
-        ]
+        return [record(setup, visit, ingredients, solved) for visit in visits[:count]]
 
     clean = recorded(added)
     sizes = {}

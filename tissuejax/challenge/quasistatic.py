@@ -1,7 +1,7 @@
-"""Equilibrium of a probed body along a path of the probe: Newton's method with a banded Cholesky factor.
+"""Equilibrium of a probed body along a path of the probe: Newton's method with a banded Cholesky factor that is kept.
 
-Nodes are numbered so that the tangent is a band; the support is a bed of springs, stiff where tissue is held, softer
-(and with a yield) sideways where it can slip.
+Nodes are numbered so that the tangent is a band (`banded`); the support is a bed of springs, stiff where tissue is
+held, softer (and with a yield) sideways where it can slip.
 """
 
 from collections.abc import Callable
@@ -9,15 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.linalg import lapack
 
+from tissuejax.challenge.banded import Band, Kept
 from tissuejax.challenge.solid import Solid
 from tissuejax.challenge.touch import Membrane, Sphere
 from tissuejax.errors import NotConverged
 
 HELD = 1e6  # N/m per node
 CLOSE = 1e-5  # N, largest residual of a node: of the force a hundredth of the noise
-SLOW = 0.5  # of the residual left by an iteration: the body's tangent is computed anew
+PATIENCE = 5.0  # iterations still to come, at the last one's pace, from which a new tangent of the body costs less
 
 
 @dataclass
@@ -32,42 +32,6 @@ class Bed:
     sideways: float | None = None
     strength: float | None = None
     slid: np.ndarray | float = 0.0
-
-
-class Band:
-    """Lower band of a symmetric matrix assembled from blocks."""
-
-    def __init__(self, nodes_of: dict[str, np.ndarray], n_nodes: int):
-        dofs = {k: (3 * v[:, :, None] + np.arange(3)).reshape(len(v), -1) for k, v in nodes_of.items()}
-        self.n = 3 * n_nodes
-        self.width = max(int((d.max(1) - d.min(1)).max()) for d in dofs.values() if len(d))
-        self.keep, self.at = {}, {}
-        for k, d in dofs.items():
-            row, col = np.broadcast_arrays(d[:, :, None], d[:, None, :])
-            self.keep[k] = (row >= col).ravel()
-            self.at[k] = (col * (self.width + 1) + row - col).ravel()[self.keep[k]]
-        self.dofs = dofs
-
-    def matrix(self, name: str, K: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
-        """Blocks of one kind and a diagonal as a flat band, column after column, in single precision."""
-        size = self.n * (self.width + 1)
-        flat = np.bincount(self.at[name], K.ravel()[self.keep[name]], size).astype(np.float32)
-        flat[:: self.width + 1] += diagonal.astype(np.float32)
-        return flat
-
-    def added(self, flat: np.ndarray, blocks: dict[str, np.ndarray]) -> np.ndarray:
-        """(width + 1, n) lower band in Fortran order: a flat one and (few) further blocks."""
-        flat = flat.copy()
-        for k, K in blocks.items():
-            np.add.at(flat, self.at[k], K.ravel()[self.keep[k]].astype(np.float32))
-        return flat.reshape(self.n, self.width + 1).T
-
-    def vector(self, blocks: dict[str, np.ndarray]) -> np.ndarray:
-        """Sum of block forces, (n,)."""
-        total = np.zeros(self.n)
-        for k, f in blocks.items():
-            total += np.bincount(self.dofs[k].ravel(), f.ravel(), self.n)
-        return total
 
 
 @dataclass
@@ -93,6 +57,7 @@ class Bench:
         areas = np.abs(np.cross((x[:, 2] - x[:, 0])[:, :2], (x[:, 3] - x[:, 1])[:, :2])) / 2
         np.add.at(size, base, areas[:, None] / 4)
         self.base, self.size = grid.base, size[grid.base]
+        self.kept: Kept | None = None
         self.factorizations = 0
 
     def _bed(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -135,8 +100,8 @@ class Bench:
     ) -> Float[np.ndarray, "3"]:
         """Move the probe to `centre` within `dt` and return the force on it, N.
 
-        The tangent of the body, which costs most, is kept over iterations as long as they converge well; that of the
-        contact is always new.
+        The tangent of the body, which costs most, is kept over iterations and steps as long as they converge well;
+        that of the contact is always new.
 
         Raises:
             NotConverged: no equilibrium found.
@@ -146,16 +111,13 @@ class Bench:
         if "bad" in now or guess is not None and np.abs(now["r"]).max() > 50:
             u = self.u
             now = self._all(u, centre, dt)
-        body = None
         for iteration in range(48):
             self.sphere.caution = min(iteration // 12, 2)
             worst = np.abs(now["r"]).max()
             if worst < CLOSE:
                 self._accept(u, now)
                 return now["parts"]["sphere"]["probe"]
-            if body is None:
-                body = self._body(u, now, dt)
-            du = self._solve(self.band.added(body, {"sphere": now["parts"]["sphere"]["K"]}), now["r"])
+            du = self._way(u, now, dt)
             size = np.abs(du).max()
             cut = min(1.0, 1.5e-3 / size)
             for _ in range(12):
@@ -166,21 +128,22 @@ class Bench:
             else:
                 break
             u, now = u - cut * du.reshape(u.shape), trial
-            if np.abs(now["r"]).max() > SLOW * worst:
-                body = None
+            left = np.abs(now["r"]).max()
+            if left > worst * (CLOSE / max(left, CLOSE)) ** (1 / PATIENCE):
+                self.kept = None
+        self.kept = None
         raise NotConverged(f"probed body: no equilibrium (largest residual {np.abs(now['r']).max():.2g} N)")
 
-    def _solve(self, band: np.ndarray, r: np.ndarray) -> np.ndarray:
-        self.factorizations += 1
-        shift = 0.0
-        for _ in range(8):
-            trial = band.copy(order="F")
-            trial[0] += np.float32(shift)
-            factor, info = lapack.spbtrf(trial, lower=1, overwrite_ab=1)
-            if info == 0:
-                return lapack.spbtrs(factor, r.astype(np.float32), lower=1)[0].astype(float)
-            shift = max(10 * shift, 0.05)
-        raise NotConverged("probed body: the tangent stays indefinite")
+    def _way(self, u: np.ndarray, now: dict, dt: float) -> np.ndarray:
+        """Newton's step: by the kept tangent and the contact of today, factored anew where that is too far from it."""
+        contact = now["parts"]["sphere"]["K"]
+        du = self.kept.solve(now["r"], contact) if self.kept else None
+        if du is None:
+            flat = self.kept.flat if self.kept else self._body(u, now, dt)
+            self.factorizations += 1
+            self.kept = Kept(self.band, flat, contact)
+            du = self.kept.back(now["r"])
+        return du
 
     def _accept(self, u: np.ndarray, now: dict) -> None:
         self.u = u
