@@ -7,7 +7,7 @@ M (Hestenes and Stiefel 1952), a back-substitution each, where a new factor cost
 
 import numpy as np
 from jaxtyping import Float
-from scipy.linalg import lapack
+from scipy.linalg import blas, lapack
 
 from tissuejax.errors import NotConverged
 
@@ -73,6 +73,11 @@ class Kept:
     def back(self, r: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
         """Solution of the system that was factored."""
         return lapack.spbtrs(self.factor, r.astype(np.float32), lower=1)[0].astype(float)
+
+    def times(self, x: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+        """The body's part of the tangent times `x`."""
+        whole = self.flat.reshape(self.band.n, -1).T
+        return blas.ssbmv(self.band.width, 1.0, whole, x.astype(np.float32), lower=1).astype(float)
 
     def solve(self, r: Float[np.ndarray, " n"], contact: Float[np.ndarray, "f 12 12"]) -> np.ndarray | None:
         """Solution with another contact, None where that is too far from the one that was factored."""

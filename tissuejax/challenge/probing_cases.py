@@ -5,8 +5,6 @@ from pathlib import Path as File
 
 import h5py
 import numpy as np
-from jaxtyping import Float
-from scipy.interpolate import PchipInterpolator
 from threadpoolctl import threadpool_limits
 
 from tissuejax.challenge.lobe import Lobe, uniform
@@ -15,6 +13,7 @@ from tissuejax.challenge.probe_paths import draw as draw_path
 from tissuejax.challenge.probing_bench import MESH, Record, Setup, Visit, record
 from tissuejax.challenge.probing_menu import CATALOGUED, LOUD, STRAY, Course
 from tissuejax.challenge.probing_rest import beside
+from tissuejax.challenge.probing_sizes import beyond, by_channel, where
 from tissuejax.challenge.rest_cases import category as rest_category
 from tissuejax.challenge.sensor_noise import correlated
 from tissuejax.challenge.solid import Tissue
@@ -23,7 +22,6 @@ from tissuejax.storage import replacing
 
 CATEGORIES = ("none", "one", "two", "unknown")
 SHARES = (0.17, 0.53, 0.15, 0.15)
-DEPTHS = 41  # edges of the depths at which a bare force is known
 SITES = ((-9.5e-3, -2e-3), (7.5e-3, -7e-3), (4e-3, 8e-3))
 
 
@@ -162,15 +160,15 @@ def _draw(
         return [record(setup, visit, ingredients, solved) for visit in visits[:count]]
 
     clean = recorded(added)
-    sizes = {}
+    sizes, more = {}, {}
     if added:
         bare = recorded([], 2)
+        more = {"where": where(by_channel(bare, clean[:2], noise))}
         for one in added:
             alone = clean[:2] if len(added) == 1 else recorded([one], 2)
             sizes[one.name] = beyond(bare, alone, noise)
-    more: dict = {}
     if rest:
-        found = beside(rng, clean, recorded([]) if added else clean, list(sizes.values()), noise[0])
+        found = beside(rng, clean, recorded([]) if added else clean, list(sizes.values()), noise)
         clean, more = found.presses, found.key
     noisy, errors = [], {}
     for r in clean:
@@ -213,30 +211,6 @@ def markers(rng: np.random.Generator, lobe: Lobe, sites: list, count: int) -> li
         if len(found) == count:
             break
     return found
-
-
-def beyond(bare: list[Record], full: list[Record], noise: tuple[float, float]) -> float:
-    """Rms over noise of what an effect leaves once the bare force is scaled to fit; force or markers, the larger.
-
-    The bare force is that along the path that was recorded, which is another one where the rig gives.
-    """
-    a = np.concatenate([along(e, f).ravel() for e, f in zip(bare, full, strict=True)])
-    b = np.concatenate([f.force.ravel() for f in full])
-    force = np.sqrt(np.mean((b - a * (a @ b) / (a @ a)) ** 2)) / noise[0]
-    seen = np.concatenate([(f.markers - e.markers).ravel() for e, f in zip(bare, full)])
-    return float(max(force, np.sqrt(np.mean(seen**2)) / noise[1]))
-
-
-def along(bare: Record, full: Record) -> Float[np.ndarray, "f 3"]:
-    """Force of the bare body, which is elastic, where `full` says the probe was: its vertical part by depth."""
-    here, there = (np.interp(bare.force_time, r.time, r.probe[:, 2]) for r in (bare, full))
-    if np.array_equal(here, there):
-        return bare.force
-    bins = np.digitize(here, np.linspace(here.min(), here.max(), DEPTHS)) - 1
-    filled = np.unique(bins)
-    depth, force = (np.array([np.mean(x[bins == k]) for k in filled]) for x in (here, bare.force[:, 2]))
-    by_depth = PchipInterpolator(depth, force)  # which goes on a little below the deepest
-    return bare.force + (by_depth(there) - by_depth(here))[:, None] * np.array([0.0, 0.0, 1.0])
 
 
 def write(case: Probing, path: File) -> None:

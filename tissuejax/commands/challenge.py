@@ -93,4 +93,6 @@ says what simpler ways of answering would have said on the same cases.
         for name, r in found["rates"].items():
             if r["of"]:
                 lines.append(f"  {name:<58}{r['share']:>6.0%}  ({r['low']:.0%} to {r['high']:.0%}, n = {r['of']})")
+        if (shown := found["channel_f1"])["of"]:
+            lines.append(f"  {'channels that show the misfit: F1':<58}{shown['f1']:>6.2f}  (n = {shown['of']})")
         return Reply(found, "\n".join(lines))
