@@ -21,16 +21,10 @@ MESH = (24, 24, 8)
 FINE, FINER, SMALL = 0.25, 0.18, 0.007
 REACH = 0.3
 STRIDE = 1e-3  # the force between stops is right to a fifth of its noise
-SENSED = {
-    "drift",
-    "clock-lag",
-    "aging",
-    "machine-compliance",
-    "rubbing",
-    "warmed",
-    "saturated",
-    "cured",
-}  # no new solve
+SENSED = {  # no new solve
+    "drift", "clock-lag", "aging", "machine-compliance", "cured", "torn", "shock", "rolls", "marker-jump"
+}  # fmt: skip
+JUMP = 0.2  # s in which a tracker slides to another marker
 FORCE_RATE, MARKER_RATE, PROBE_RATE = 62.5, 15.0, 100.0
 
 
@@ -132,7 +126,9 @@ def record(setup: Setup, visit: Visit, ingredients: list[Ingredient], solved: di
     lag = have["clock-lag"].amount if "clock-lag" in have else 0.0
     seen = np.clip(mt - lag, 0, end)
     shown = rest + between(pieces, at, moved, seen) + support(seen)[:, None]
-    felt = sensed(have, path, between(pieces, at, force, ft), ft, clock)
+    if "marker-jump" in have:
+        shown = slid(have["marker-jump"], visit, rest, mt, shown)
+    felt = sensed(have, visit, between(pieces, at, force, ft), ft)
     probe = path.at(time)
     if "machine-compliance" in have:  # the tip went where it went; the actuator had to go further by c F
         probe = probe - have["machine-compliance"].amount * between(pieces, at, force, time)
@@ -205,33 +201,53 @@ def assembled(
     return Bench(solid, sphere, bed, skin), watch
 
 
-def sensed(
-    have: dict[str, Ingredient], path: Path, F: np.ndarray, t: np.ndarray, clock: tuple[float, float]
-) -> np.ndarray:
+def slid(i: Ingredient, visit: Visit, rest: np.ndarray, t: np.ndarray, shown: np.ndarray) -> np.ndarray:
+    """Markers as shown by a tracker that slides a share of the way to the nearest neighbour of one of them, m."""
+    if visit.number != i.shape["number"]:
+        return shown
+    one = int(i.shape["which"] * len(rest))
+    away = np.linalg.norm(rest - rest[one], axis=-1)
+    other = int(np.argsort(away)[1])
+    gone = np.clip((t - i.shape["where"] * visit.path.time[-1]) / JUMP, 0, 1)
+    shown = shown.copy()
+    shown[:, one] += i.amount * gone[:, None] * (rest[other] - rest[one])
+    return shown
+
+
+def turned(i: Ingredient, F: Float[np.ndarray, "f 3"]) -> Float[np.ndarray, "f 3"]:
+    """Force in the axes of a tip that rolls about a level axis by an angle that grows with the load (Rodrigues)."""
+    k = np.array([*i.shape["axis"], 0.0])
+    size = np.linalg.norm(F, axis=1)
+    angle = (i.amount * size / max(size.max(), 1e-12))[:, None]
+    return F * np.cos(angle) + np.cross(k, F) * np.sin(angle) + (F @ k)[:, None] * k * (1 - np.cos(angle))
+
+
+def sensed(have: dict[str, Ingredient], visit: Visit, F: Float[np.ndarray, "f 3"], t: np.ndarray) -> np.ndarray:
     """Force as the sensor reports it, N."""
+    path, clock = visit.path, visit.clock
+    end = path.time[-1]
+    if "torn" in have:
+        i = have["torn"]
+        torn = (visit.number > i.shape["number"]) | (
+            (visit.number == i.shape["number"]) & (t >= i.shape["where"] * end)
+        )
+        F = F * (1 - i.amount * torn)[:, None]
     if "aging" in have:
         F = F * np.exp(have["aging"].amount * (clock[0] + t) / clock[1])[:, None]
-    if "warmed" in have:
-        i = have["warmed"]
-        F = F * (1 + i.amount * np.sin(2 * np.pi * t / i.shape["period"] + i.shape["phase"]))[:, None]
     if "cured" in have:
         still = np.flatnonzero(
             (np.abs(np.diff(path.place[:, 2])) < 1e-9) & (path.place[1:, 2] < path.place[0, 2] - 2e-3)
         )
         since = np.maximum(t - path.time[still[0]], 0)
         F = F * (1 - have["cured"].amount * np.expm1(-since / have["cured"].shape["time"]))[:, None]
-    if "rubbing" in have:
-        i = have["rubbing"]
-        z = path.at(t)[:, 2]
-        q = np.zeros(len(t))
-        for k in range(1, len(t)):
-            q[k] = np.clip(q[k - 1] - i.amount / i.shape["travel"] * (z[k] - z[k - 1]), -i.amount, i.amount)
-        F = F + q[:, None] * np.array([0, 0, 1.0])
+    if "rolls" in have:
+        F = turned(have["rolls"], F)
+    if "shock" in have and have["shock"].shape["number"] == visit.number:
+        i = have["shock"]
+        since = np.maximum(t - i.shape["where"] * end, 0) / i.shape["time"]
+        F = F + (i.amount * since * np.exp(1 - since))[:, None] * np.array([0.2, -0.1, 1.0])
     if "drift" in have:
         i = have["drift"]
         zero = i.amount * (i.shape["mix"][0] + i.shape["mix"][1] * t / 10)
         F = F + zero[:, None] * np.array([0.2, -0.1, 1.0])
-    if "saturated" in have:
-        limit = (1 - have["saturated"].amount) * np.abs(F[:, 2]).max()
-        F = np.clip(F, -limit, limit)
     return F

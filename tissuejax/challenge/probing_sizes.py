@@ -1,4 +1,4 @@
-"""How large a concealed effect is in a probing, over the noise: as a whole, and channel by channel."""
+"""How large a concealed effect is in a probing, over the noise: in force and markers, and channel by channel."""
 
 from collections.abc import Sequence
 
@@ -28,10 +28,10 @@ def missing(
     return b - a * scale, seen
 
 
-def beyond(bare: Sequence[Record], full: Sequence[Record], noise: tuple[float, float]) -> float:
-    """Rms over noise of what an effect leaves once the bare force is scaled to fit; force or markers, the larger."""
-    parts = missing(bare, full)
-    return max(float(np.sqrt(np.mean(x**2)) / s) for x, s in zip(parts, noise))
+def parts(bare: Sequence[Record], full: Sequence[Record], noise: tuple[float, float]) -> tuple[float, float]:
+    """Rms over noise of what an effect leaves, in force and in markers, once the bare force is scaled to fit."""
+    force, markers = (float(np.sqrt(np.mean(x**2)) / s) for x, s in zip(missing(bare, full), noise))
+    return force, markers
 
 
 def by_channel(
