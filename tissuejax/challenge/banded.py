@@ -83,11 +83,10 @@ class Kept:
         first = int(dofs.min()) // BLOCK * BLOCK
         for j in range(first, n, BLOCK):
             k, end = min(j + BLOCK, n), min(j + BLOCK + w, n)
-            own = as_strided(memory[j + j * w :], (k - j, k - j), (4, 4 * w))
-            Y[j:k] = blas.strsm(1.0, np.asfortranarray(own), Y[j:k], lower=1)
-            if end > k:
-                below = as_strided(memory[k + j * w :], (end - k, k - j), (4, 4 * w))
-                inside = np.arange(k, end)[:, None] - np.arange(j, k) <= w
-                Y[k:end] -= np.where(inside, below, np.float32(0)) @ Y[j:k]
+            whole = as_strided(memory[j + j * w :], (end - j, k - j), (4, 4 * w))
+            inside = np.arange(j, end)[:, None] - np.arange(j, k) <= w  # beyond the band lies other columns' memory
+            block = np.where(inside, whole, np.float32(0))
+            Y[j:k] = blas.strsm(1.0, block[: k - j], Y[j:k], lower=1)
+            Y[k:end] -= block[k - j :] @ Y[j:k]
         Y = Y[first:]
         self.dofs, self.compliance = dofs, (Y.T @ Y).astype(float)
