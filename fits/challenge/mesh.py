@@ -38,8 +38,8 @@ def pressed(mesh: tuple[int, int, int], fine: float) -> probing_bench.Record:
     heights = np.array([top + 5e-4, top - DEPTH, top - DEPTH, top + 5e-4])
     path = Way(np.array([0.0, 2.5, 4.5, 7.0]), np.stack([0 * heights + SITE[0], 0 * heights + SITE[1], heights], 1))
     places = markers(np.random.default_rng(0), LOBE, [SITE], 11)
-    body = LOBE, Tissue(463.0, 337.0, 2e4), [], path, SITE, [SITE], RADIUS, places
-    return probing_bench.record(*body, 0, (0.0, 0.0), 0.0, mesh)
+    setup = probing_bench.Setup(LOBE, Tissue(463.0, 337.0, 2e4), [SITE], RADIUS, places, mesh)
+    return probing_bench.record(setup, probing_bench.Visit(0, path, (0.0, 0.0)), [])
 
 
 def main() -> None:

@@ -9,6 +9,7 @@ import csv
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 
 from tissuejax.challenge.calibration import calibration
 from tissuejax.challenge.rates import rate
@@ -119,6 +120,12 @@ def by_answer(folder: Path) -> tuple[dict, list[str]]:
     return found, lines
 
 
+def seconds(rows: list[dict]) -> str:
+    """Median and longest time of a case, s, where known."""
+    known = [float(r["seconds"]) for r in rows if r.get("seconds") not in (None, "", "nan")]
+    return f"{median(known):.0f}, {max(known):.0f}" if known else "-"
+
+
 def share(r: dict) -> str:
     """42 of 44 (95 %)."""
     return f"{round(r['share'] * r['of'])} of {r['of']} ({r['share']:.0%})" if r["of"] else "-"
@@ -133,12 +140,19 @@ def main(folder: Path) -> str:
         by_set = {name: counted(some) for name, some in each.items()}
         found[kind] = {"sets": by_set, "all": counted(rows), "confidence": confidence(rows), "cases": len(rows)}
         names = list(found[kind]["all"])
-        lines += ["", "| sealed set (seed) | cases | " + " | ".join(names) + " |", "|---" * (len(names) + 2) + "|"]
+        head = ["sealed set (seed)", "cases", *names, "s a case: median, longest"]
+        lines += ["", "| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
         for name, r in by_set.items():
-            lines.append(f"| {name} | {len(each[name])} | " + " | ".join(share(r[n]) for n in names) + " |")
+            lines.append(
+                f"| {name} | {len(each[name])} | "
+                + " | ".join([*(share(r[n]) for n in names), seconds(each[name])])
+                + " |"
+            )
         total = found[kind]["all"]
         lines.append(
-            f"| **all {len(each)}** | {len(rows)} | " + " | ".join(f"**{share(total[n])}**" for n in names) + " |"
+            f"| **all {len(each)}** | {len(rows)} | "
+            + " | ".join([*(f"**{share(total[n])}**" for n in names), seconds(rows)])
+            + " |"
         )
         told = found[kind]["confidence"]
         lines += ["", f"Stated confidence of all {told['of']} answers that state one (expected calibration error "

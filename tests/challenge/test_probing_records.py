@@ -7,8 +7,9 @@ from tissuejax.challenge import probing_cases
 from tissuejax.challenge.lobe import Lobe
 from tissuejax.challenge.material import Ingredient
 from tissuejax.challenge.probe_paths import Path, over
-from tissuejax.challenge.probing_bench import Record, record
+from tissuejax.challenge.probing_bench import Record, Setup, Visit, record
 from tissuejax.challenge.probing_menu import CATALOGUED, LOUD
+from tissuejax.challenge.probing_sizes import parts
 from tissuejax.challenge.solid import Tissue
 
 LOBE = Lobe(0.03, 0.027, 0.09, 0.02, 0.5, 0.9, (0.0, 0.0))
@@ -26,8 +27,8 @@ def told():
     def of(*effects: Ingredient):
         places = [(0.3, 0.2), (-0.2, 0.4)]
         site = (0.0, 0.0)
-        body = LOBE, Tissue(600.0, 300.0, 2e4), list(effects), path, site, [site], RADIUS, places
-        return record(*body, 0, (100.0, 400.0), 0.0, (5, 5, 3), solved)
+        setup = Setup(LOBE, Tissue(600.0, 300.0, 2e4), [site], RADIUS, places, (5, 5, 3))
+        return record(setup, Visit(0, path, (100.0, 400.0)), list(effects), solved)
 
     return of, solved
 
@@ -63,7 +64,7 @@ def test_a_rig_that_gives_is_as_large_as_it_bends_the_force_along_the_path_recor
 
     there, felt = A * (deep + c * A * deep**power) ** power, A * deep**power
     left = felt - there * (there @ felt) / (there @ there)
-    size = probing_cases.beyond([pressed(deep)], [pressed(deep + c * felt)], (1e-3, 1e-4))
+    size = max(parts([pressed(deep)], [pressed(deep + c * felt)], (1e-3, 1e-4)))
     assert size == pytest.approx(np.sqrt(np.mean(left**2) / 3) / 1e-3, rel=0.05, abs=0.01)
     assert (size > 0.5) == (power == 2)
 

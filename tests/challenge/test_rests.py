@@ -10,6 +10,7 @@ from tissuejax.challenge.make import make, seed_of
 from tissuejax.challenge.material import Specimen, reported
 from tissuejax.challenge.probing_bench import Record as Press
 from tissuejax.challenge.probing_rest import beside
+from tissuejax.challenge.probing_sizes import by_channel, where
 from tissuejax.challenge.protocols import trials
 from tissuejax.challenge.rest_marks import mark_rest, true_size
 from tissuejax.challenge.rests import rests
@@ -211,7 +212,8 @@ def press(name, start, force):
 def test_a_probing_s_rest_is_the_asked_share_and_leaves_the_markers():
     bare = [press(f"r{i}", 100.0 * i, 1.0) for i in range(3)]
     clean = [press(f"r{i}", 100.0 * i, 1.2 - 0.3 * i) for i in range(3)]
-    found = beside(np.random.default_rng(2), clean, bare, [8.0, 12.0], 0.003)
+    found = beside(np.random.default_rng(2), clean, bare, [8.0, 12.0], (0.003, 5e-5))
+    assert found.key["where"]["channels"]
     assert found.key["rest"]["over_noise"] == pytest.approx(8.0 * found.key["rest"]["ratio"])
     squares = [found.key["rest"]["beyond_rms"][n] ** 2 for n in ("r0", "r1")]
     assert np.sqrt(np.mean(squares)) / 0.003 == pytest.approx(found.key["rest"]["over_noise"], rel=1e-6)
@@ -219,3 +221,40 @@ def test_a_probing_s_rest_is_the_asked_share_and_leaves_the_markers():
         assert a.markers is b.markers
         assert np.any(a.force != b.force)
     assert set(found.key["where"]["phases"]) <= set(places.PHASES)
+
+
+def located(**channels: float) -> list[dict]:
+    return [{"kind": "recording", "recording": "r1", "channel": n, "share": s} for n, s in channels.items()] + [
+        {"kind": "phase", "recording": "all", "channel": "markers", "phase": "hold", "share": 0.9}
+    ]
+
+
+def test_channels_of_a_probing_s_misfit_by_algebra():
+    """Bare force a along z; the effect adds 3 noises across and moves markers by 2: what a factor can't take up."""
+    noise, t = (0.003, 5e-5), np.linspace(0.0, 1.0, 40)
+    along, across = np.sin(np.pi * t), np.cos(np.pi * t)  # orthogonal, so that the factor of the force stays one
+
+    def made(side: float, moved: float) -> Press:
+        force = np.stack([side * across, 0 * t, 0.3 * along], -1)
+        markers = np.full((40, 2, 3), moved)
+        return Press("r", 0.0, 0.009, t, np.zeros((40, 3)), t, force, t, markers)
+
+    found = by_channel([made(0.0, 0.0)], [made(3 * noise[0], 2 * noise[1])], noise)
+    rms = float(np.sqrt(np.mean(across**2)))
+    assert {n: size for n, (size, _) in found.items()} == pytest.approx(
+        {"force x": 3 * rms, "force y": 0.0, "force z": 0.0, "markers": 2.0}, abs=1e-9
+    )
+    assert found["markers"][1] == pytest.approx(4 * 240)  # 40 samples of 2 markers with 3 components
+    assert found["force x"][1] == pytest.approx(9 * np.sum(across**2))
+    assert where(found)["channels"] == ["markers"]  # 960 of 960 + 9 * 21 hold four fifths
+    assert where(by_channel([made(0.0, 0.0)], [made(3 * noise[0], 0.0)], noise))["channels"] == ["force x"]
+    assert where(by_channel([made(0.0, 0.0)], [made(0.5 * noise[0], 0.0)], noise))["channels"] == []
+
+
+def test_f1_of_channels_counts_cases_whose_key_names_any():
+    keys = [{"where": {"channels": ["markers"]}}, {"where": {"channels": ["force x", "force z"]}}, {}]
+    said = [located(**{"markers": 0.9, "force z": 0.1}), located(**{"force z": 0.6, "markers": 0.4}), located()]
+    counts = [places.channels_found(k, {"located": s}) for k, s in zip(keys, said)]
+    assert counts == [(1, 0, 0), (1, 1, 1), None]
+    assert places.channel_f1(counts) == {"f1": pytest.approx(2 * 2 / (2 * 2 + 1 + 1)), "of": 2}
+    assert places.channel_f1([None]) == {"f1": None, "of": 0}

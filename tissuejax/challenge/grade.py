@@ -10,6 +10,7 @@ from pathlib import Path
 
 from tissuejax.challenge import files
 from tissuejax.challenge.calibration import calibration
+from tissuejax.challenge.places import channel_f1
 from tissuejax.challenge.rates import rate, spread
 from tissuejax.challenge.rest_grade import grade_rest
 from tissuejax.challenge.verdicts import SETTLED, Mark, mark
@@ -98,6 +99,7 @@ def summary(marks: list[Mark]) -> dict:
     return {
         "rates": rates,
         "held_out_error_over_truth": {"known physics": spread(known), "exactly right": spread(right)},
+        "channel_f1": channel_f1([m.channels for m in marks]),
         "seconds": spread([m.seconds for m in marks if math.isfinite(m.seconds)]),
         "confusion": confusion(marks),
         "by_size": by_size(marks),
@@ -167,4 +169,5 @@ def _row(m: Mark) -> dict:
     row = asdict(m)
     for name in ("truth", "named", "alternatives"):
         row[name] = " + ".join(row[name])
+    row["channels"] = "/".join(map(str, m.channels or ()))
     return {k: (f"{v:.4g}" if isinstance(v, float) else v) for k, v in row.items()}

@@ -30,6 +30,7 @@ def make(
     pairs: bool = False,
     commit: str | None = None,
     rest: bool = False,
+    aimed: bool = False,
 ) -> dict:
     """Make `count` cases and return the manifest.
 
@@ -47,6 +48,7 @@ def make(
         strong: probings with strong effects only, one or two of them: how often is right what can be seen?
         pairs: probings with two effects each, both of those that can be seen at all, at the upper end of their range.
         rest: probings with a rest in the force that no catalogue has, beside their effects or alone.
+        aimed: probings at sizes where it is open whether their effects can be told, in turn (`probing_aims`).
         commit: hash of the commit that will be measured; the seed is drawn from it, so that nobody chooses it.
 
     Raises:
@@ -58,13 +60,15 @@ def make(
         raise unknown("kind of challenge", kind, KINDS)
     if count < 1 or jobs < 1:
         raise InputError(f"count {count}, jobs {jobs}: both must be 1 or more")
-    if strong + pairs + rest > 1:
-        raise InputError("--strong, --pairs, --rest: one of them at most (strong ones have pairs among them already)")
-    if (strong or pairs or rest) and kind != "probing":
+    if strong + pairs + rest + aimed > 1:
         raise InputError(
-            "--strong, --pairs, --rest are of probings; take --kind probing, or --kind rest for material tests"
+            "--strong, --pairs, --rest, --aimed: one of them at most (strong ones have pairs among them already)"
         )
-    which = {"strong": strong, "pairs": pairs} | ({"rest": True} if rest else {})
+    if (strong or pairs or rest or aimed) and kind != "probing":
+        raise InputError(
+            "--strong, --pairs, --rest, --aimed are of probings; take --kind probing, or --kind rest for material tests"
+        )
+    which = {"strong": strong, "pairs": pairs} | ({"rest": True} if rest else {}) | ({"aimed": True} if aimed else {})
     pinned = {} if commit is None else {"commit": commit}
     if commit is not None:
         seed = seed_of(commit, kind, which)

@@ -147,8 +147,10 @@ def sensed(specimen: Specimen, trial: Trial, P: History) -> History:
     """What the load cell makes of the stress `P`."""
     column = (-1, *([1] * (P.ndim - 1)))
     for stray in specimen.ingredients:
-        if stray.name == "warmed":
-            P = stray_laws.warmed(trial, P, stray.amount, **stray.shape)
+        if stray.name == "torn":
+            P = stray_laws.torn(trial, P, stray.amount, **stray.shape)
+        elif stray.name == "shock":
+            P = P + stray_laws.shock(trial, stray.amount, **stray.shape).reshape(column)
         elif stray.name == "cured":
             P = stray_laws.cured(trial, P, stray.amount, **stray.shape)
         elif stray.name == "stick-slip":
@@ -166,8 +168,6 @@ def sensed(specimen: Specimen, trial: Trial, P: History) -> History:
         P = stray_laws.skipped(trial, P, late.amount, **late.shape)
     if still := specimen.get("frozen"):
         P = stray_laws.frozen(trial, P, still.amount, **still.shape)
-    if full := specimen.get("saturated"):
-        P = stray_laws.saturated(P, full.amount)
     if coarse := specimen.get("stepped"):
         P = stray_laws.stepped(P, coarse.amount)
     return P

@@ -129,6 +129,12 @@ def _mix(rng, s):
     return {"mix": [math.cos(angle), math.sin(angle) / 10.0]}
 
 
+def _moment(rng, s):
+    """A moment in the loaded part of one of the recordings that are fitted, s after the first began."""
+    trial = s.trials[int(rng.integers(max(len(s.trials) - 1, 1)))]
+    return {"at": float(trial.start + rng.uniform(0.25, 0.6) * trial.time[-1])}
+
+
 CATALOGUED: tuple[Choice, ...] = (
     Choice("viscoelasticity", "pk2", 0.003, 0.7, _prony),
     Choice("viscoelasticity", "nominal", 0.003, 0.7, _prony),
@@ -185,15 +191,10 @@ CATALOGUED: tuple[Choice, ...] = (
 
 STRAY: tuple[Choice, ...] = (
     Choice("slip-event", "", 0.001, 0.08, _strays(0.2, 0.8, "where"), plain=False),
-    Choice("saturated", "", 0.01, 0.5, plain=False),
+    Choice("torn", "", 0.005, 0.6, _moment, plain=False),
     Choice("stepped", "", 1.0, 25.0, unit="noise", plain=False),
     Choice(
-        "warmed",
-        "",
-        0.005,
-        0.5,
-        lambda rng, s: {"period": _log(rng, 8, 40), "phase": rng.uniform(0, 6.28)},
-        plain=False,
+        "shock", "", 0.5, 80.0, lambda rng, s: {**_moment(rng, s), "time": _log(rng, 0.6, 4.0)}, "noise", plain=False
     ),
     Choice("frozen", "", 0.1, 6.0, _strays(0.1, 0.8, "where"), plain=False),
     Choice("cured", "", 0.005, 0.8, lambda rng, s: {"time": _log(rng, 1.0, 5.0)}, plain=False),

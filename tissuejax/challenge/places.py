@@ -1,6 +1,6 @@
-"""Where a sample's law falls short, by recording and phase: of the truth, and of what a diagnosis says of it."""
+"""Where a sample's law falls short, by recording, phase and channel: truly, and as a diagnosis says."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Int
@@ -73,6 +73,32 @@ def stated(located: Iterable[Mapping]) -> tuple[list[str], list[str]]:
             name = x.get("phase") or next((p for p in PHASES if p in str(x.get("what")).split()), "")
             kinds[name] = kinds.get(name, 0.0) + float(x["share"])
     return most_of(recordings), most_of(kinds)
+
+
+def stated_channels(located: Iterable[Mapping]) -> list[str]:
+    """Channels ("force x", ..., "markers") that a result's `located` says hold most of the misfit."""
+    channels: dict[str, float] = {}
+    for x in located:
+        if x.get("kind") == "recording":
+            channels[str(x.get("channel"))] = channels.get(str(x.get("channel")), 0.0) + float(x["share"])
+    return most_of(channels)
+
+
+def channels_found(key: Mapping, result: Mapping) -> tuple[int, int, int] | None:
+    """(right, false, missed) channels of a probing; None where the key names none."""
+    true = key.get("where", {}).get("channels")
+    return agreement(true, stated_channels(result.get("located") or ())) if true else None
+
+
+def f1(counts: Iterable[tuple[int, int, int] | None]) -> float | None:
+    """2 right / (2 right + false + missed) of all counts that are there (van Rijsbergen 1979); None without any."""
+    right, false, missed = np.sum([c for c in counts if c is not None] or [(0, 0, 0)], axis=0)
+    return float(2 * right / (2 * right + false + missed)) if right + false + missed else None
+
+
+def channel_f1(counts: Sequence[tuple[int, int, int] | None]) -> dict:
+    """F1 of the channels that show the misfit, over the cases whose key names any."""
+    return {"f1": f1(counts), "of": sum(c is not None for c in counts)}
 
 
 def agreement(true: Iterable[str], said: Iterable[str]) -> tuple[int, int, int]:

@@ -21,16 +21,10 @@ MESH = (24, 24, 8)
 FINE, FINER, SMALL = 0.25, 0.18, 0.007
 REACH = 0.3
 STRIDE = 1e-3  # the force between stops is right to a fifth of its noise
-SENSED = {
-    "drift",
-    "clock-lag",
-    "aging",
-    "machine-compliance",
-    "rubbing",
-    "warmed",
-    "saturated",
-    "cured",
-}  # no new solve
+SENSED = {  # no new solve
+    "drift", "clock-lag", "aging", "machine-compliance", "cured", "torn", "shock", "rolls", "marker-jump"
+}  # fmt: skip
+JUMP = 0.2  # s in which a tracker slides to another marker
 FORCE_RATE, MARKER_RATE, PROBE_RATE = 62.5, 15.0, 100.0
 
 
@@ -58,39 +52,56 @@ class Record:
     markers: Float[np.ndarray, "m k 3"]
 
 
-def record(
-    lobe: Lobe,
-    tissue: Tissue,
-    ingredients: list[Ingredient],
-    path: Path,
-    site: tuple[float, float],
-    sites: list[tuple[float, float]],
-    radius: float,
-    places: list[tuple[float, float]],
-    number: int,
-    clock: tuple[float, float],
-    phase: float,
-    mesh: tuple[int, int, int] = MESH,
-    solved: dict | None = None,
-) -> Record:
+@dataclass(frozen=True)
+class Setup:
+    """What all recordings of a case share.
+
+    Attributes:
+        sites: place under the probe in each recording, m.
+        radius: of the tip, m.
+        places: surface parameters of the markers.
+        mesh: hexes along each direction.
+    """
+
+    lobe: Lobe
+    tissue: Tissue
+    sites: list[tuple[float, float]]
+    radius: float
+    places: list[tuple[float, float]]
+    mesh: tuple[int, int, int] = MESH
+
+
+@dataclass(frozen=True)
+class Visit:
+    """One recording to be made.
+
+    Attributes:
+        number: of the recording, from 0.
+        path: of the probe.
+        clock: start of this recording and of the last one, s.
+        phase: of a moving support in this recording.
+    """
+
+    number: int
+    path: Path
+    clock: tuple[float, float]
+    phase: float = 0.0
+
+
+def record(setup: Setup, visit: Visit, ingredients: list[Ingredient], solved: dict | None = None) -> Record:
     """Solve one recording without noise.
 
     Args:
-        site: place under the probe, m; `sites` those of all recordings.
-        places: surface parameters of the markers.
-        number: of the recording, from 0.
-        clock: start of this recording and of the last one, s.
-        phase: of a moving support in this recording.
-        mesh: hexes along each direction.
         solved: what was solved before for the same paths: effects that only sensors feel find it there.
     """
+    lobe, radius, places, path, clock = setup.lobe, setup.radius, setup.places, visit.path, visit.clock
     have = {i.name: i for i in ingredients}
-    support = supported(have, path, phase)
+    support = supported(have, path, visit.phase)
     offset = np.zeros(3)
     if "registration" in have:
         offset[:2] = have["registration"].amount * np.array(have["registration"].shape["way"])
     if "contact-offset" in have:
-        offset[2] = have["contact-offset"].amount * have["contact-offset"].shape["signs"][number]
+        offset[2] = have["contact-offset"].amount * have["contact-offset"].shape["signs"][visit.number]
 
     def motion(t: np.ndarray) -> np.ndarray:
         return path.at(t) + offset - support(t)
@@ -99,13 +110,13 @@ def record(
     every = 0.12 if "periodic" in have else 0.8 if history else None
     at, pieces = stops(path, motion, lobe, radius, 0.7 * STRIDE if history else STRIDE, every)
     solved = {} if solved is None else solved
-    same = number, tuple((i.name, i.amount) for i in ingredients if i.name not in SENSED)
+    same = visit.number, tuple((i.name, i.amount) for i in ingredients if i.name not in SENSED)
     if same not in solved:
         where = motion(at)
         close = gap(lobe, where, radius) < (1e-3 if "adhesion" in have else 1e-4)
         force, moved = np.zeros((len(at), 3)), np.zeros((len(at), len(places), 3))
         if close.any():
-            bench, watch = assembled(lobe, tissue, have, site, sites, radius, places, motion(path.time), mesh)
+            bench, watch = assembled(setup, visit, have, motion(path.time))
             force[close], moved[close] = bench.follow(at[close], where[close], watch)
         solved[same] = force, moved
     force, moved = solved[same]
@@ -115,11 +126,13 @@ def record(
     lag = have["clock-lag"].amount if "clock-lag" in have else 0.0
     seen = np.clip(mt - lag, 0, end)
     shown = rest + between(pieces, at, moved, seen) + support(seen)[:, None]
-    felt = sensed(have, path, between(pieces, at, force, ft), ft, clock)
+    if "marker-jump" in have:
+        shown = slid(have["marker-jump"], visit, rest, mt, shown)
+    felt = sensed(have, visit, between(pieces, at, force, ft), ft)
     probe = path.at(time)
     if "machine-compliance" in have:  # the tip went where it went; the actuator had to go further by c F
         probe = probe - have["machine-compliance"].amount * between(pieces, at, force, time)
-    return Record(f"r{number + 1}", float(clock[0]), radius, time, probe, ft, felt, mt, shown)
+    return Record(f"r{visit.number + 1}", float(clock[0]), radius, time, probe, ft, felt, mt, shown)
 
 
 def supported(have: dict[str, Ingredient], path: Path, phase: float) -> Callable[[np.ndarray], np.ndarray]:
@@ -141,8 +154,15 @@ def supported(have: dict[str, Ingredient], path: Path, phase: float) -> Callable
     return support
 
 
-def assembled(lobe, tissue, have, site, sites, radius, places, way, mesh) -> tuple[Bench, Callable]:
-    """The bench of one recording and the function that reads the markers' displacements."""
+def assembled(
+    setup: Setup, visit: Visit, have: dict[str, Ingredient], way: Float[np.ndarray, "c 3"]
+) -> tuple[Bench, Callable]:
+    """The bench of one recording and the function that reads the markers' displacements.
+
+    Args:
+        way: corners of the tip's path relative to the body, m.
+    """
+    lobe, tissue, radius, sites = setup.lobe, setup.tissue, setup.radius, setup.sites
     if "viscoelasticity" in have:
         i = have["viscoelasticity"]
         split = i.shape["split"]
@@ -153,7 +173,9 @@ def assembled(lobe, tissue, have, site, sites, radius, places, way, mesh) -> tup
         tissue = replace(tissue, C30=have["energy-form"].amount)
     if "anisotropy" in have:
         tissue = replace(tissue, fibre=have["anisotropy"].amount, along=tuple(have["anisotropy"].shape["along"]))
-    grid = graded(lobe, lobe.parameters(*site), *mesh, fine=FINE if radius > SMALL else FINER, reach=REACH)
+    grid = graded(
+        lobe, lobe.parameters(*sites[visit.number]), *setup.mesh, fine=FINE if radius > SMALL else FINER, reach=REACH
+    )
     solid = Solid(grid, tissue)
     if "inclusion" in have:
         i = have["inclusion"]
@@ -171,7 +193,7 @@ def assembled(lobe, tissue, have, site, sites, radius, places, way, mesh) -> tup
         sphere.pull, sphere.range = have["adhesion"].amount, have["adhesion"].shape["range"]
     bed = Bed(have["base-slip"].amount) if "base-slip" in have else Bed()
     skin = Membrane(grid, have["capsule"].amount) if "capsule" in have else None
-    weights = [grid.on_top(*p) for p in places]
+    weights = [grid.on_top(*p) for p in setup.places]
 
     def watch(u: np.ndarray) -> np.ndarray:
         return np.array([w @ u[nodes] for nodes, w in weights])
@@ -179,33 +201,53 @@ def assembled(lobe, tissue, have, site, sites, radius, places, way, mesh) -> tup
     return Bench(solid, sphere, bed, skin), watch
 
 
-def sensed(
-    have: dict[str, Ingredient], path: Path, F: np.ndarray, t: np.ndarray, clock: tuple[float, float]
-) -> np.ndarray:
+def slid(i: Ingredient, visit: Visit, rest: np.ndarray, t: np.ndarray, shown: np.ndarray) -> np.ndarray:
+    """Markers as shown by a tracker that slides a share of the way to the nearest neighbour of one of them, m."""
+    if visit.number != i.shape["number"]:
+        return shown
+    one = int(i.shape["which"] * len(rest))
+    away = np.linalg.norm(rest - rest[one], axis=-1)
+    other = int(np.argsort(away)[1])
+    gone = np.clip((t - i.shape["where"] * visit.path.time[-1]) / JUMP, 0, 1)
+    shown = shown.copy()
+    shown[:, one] += i.amount * gone[:, None] * (rest[other] - rest[one])
+    return shown
+
+
+def turned(i: Ingredient, F: Float[np.ndarray, "f 3"]) -> Float[np.ndarray, "f 3"]:
+    """Force in the axes of a tip that rolls about a level axis by an angle that grows with the load (Rodrigues)."""
+    k = np.array([*i.shape["axis"], 0.0])
+    size = np.linalg.norm(F, axis=1)
+    angle = (i.amount * size / max(size.max(), 1e-12))[:, None]
+    return F * np.cos(angle) + np.cross(k, F) * np.sin(angle) + (F @ k)[:, None] * k * (1 - np.cos(angle))
+
+
+def sensed(have: dict[str, Ingredient], visit: Visit, F: Float[np.ndarray, "f 3"], t: np.ndarray) -> np.ndarray:
     """Force as the sensor reports it, N."""
+    path, clock = visit.path, visit.clock
+    end = path.time[-1]
+    if "torn" in have:
+        i = have["torn"]
+        torn = (visit.number > i.shape["number"]) | (
+            (visit.number == i.shape["number"]) & (t >= i.shape["where"] * end)
+        )
+        F = F * (1 - i.amount * torn)[:, None]
     if "aging" in have:
         F = F * np.exp(have["aging"].amount * (clock[0] + t) / clock[1])[:, None]
-    if "warmed" in have:
-        i = have["warmed"]
-        F = F * (1 + i.amount * np.sin(2 * np.pi * t / i.shape["period"] + i.shape["phase"]))[:, None]
     if "cured" in have:
         still = np.flatnonzero(
             (np.abs(np.diff(path.place[:, 2])) < 1e-9) & (path.place[1:, 2] < path.place[0, 2] - 2e-3)
         )
         since = np.maximum(t - path.time[still[0]], 0)
         F = F * (1 - have["cured"].amount * np.expm1(-since / have["cured"].shape["time"]))[:, None]
-    if "rubbing" in have:
-        i = have["rubbing"]
-        z = path.at(t)[:, 2]
-        q = np.zeros(len(t))
-        for k in range(1, len(t)):
-            q[k] = np.clip(q[k - 1] - i.amount / i.shape["travel"] * (z[k] - z[k - 1]), -i.amount, i.amount)
-        F = F + q[:, None] * np.array([0, 0, 1.0])
+    if "rolls" in have:
+        F = turned(have["rolls"], F)
+    if "shock" in have and have["shock"].shape["number"] == visit.number:
+        i = have["shock"]
+        since = np.maximum(t - i.shape["where"] * end, 0) / i.shape["time"]
+        F = F + (i.amount * since * np.exp(1 - since))[:, None] * np.array([0.2, -0.1, 1.0])
     if "drift" in have:
         i = have["drift"]
         zero = i.amount * (i.shape["mix"][0] + i.shape["mix"][1] * t / 10)
         F = F + zero[:, None] * np.array([0.2, -0.1, 1.0])
-    if "saturated" in have:
-        limit = (1 - have["saturated"].amount) * np.abs(F[:, 2]).max()
-        F = np.clip(F, -limit, limit)
     return F

@@ -5,25 +5,24 @@ from pathlib import Path as File
 
 import h5py
 import numpy as np
-from jaxtyping import Float
-from scipy.interpolate import PchipInterpolator
 from threadpoolctl import threadpool_limits
 
 from tissuejax.challenge.lobe import Lobe, uniform
 from tissuejax.challenge.material import Ingredient
-from tissuejax.challenge.material_cases import correlated
 from tissuejax.challenge.probe_paths import draw as draw_path
-from tissuejax.challenge.probing_bench import MESH, Record, record
+from tissuejax.challenge.probing_aims import COARSE, Aim, aim
+from tissuejax.challenge.probing_bench import MESH, Record, Setup, Visit, record
 from tissuejax.challenge.probing_menu import CATALOGUED, LOUD, STRAY, Course
 from tissuejax.challenge.probing_rest import beside
+from tissuejax.challenge.probing_sizes import by_channel, parts, where
 from tissuejax.challenge.rest_cases import category as rest_category
+from tissuejax.challenge.sensor_noise import correlated
 from tissuejax.challenge.solid import Tissue
 from tissuejax.errors import NotConverged
 from tissuejax.storage import replacing
 
 CATEGORIES = ("none", "one", "two", "unknown")
 SHARES = (0.17, 0.53, 0.15, 0.15)
-DEPTHS = 41  # edges of the depths at which a bare force is known
 SITES = ((-9.5e-3, -2e-3), (7.5e-3, -7e-3), (4e-3, 8e-3))
 
 
@@ -45,6 +44,7 @@ def category(index: int) -> str:
     return CATEGORIES[int(np.searchsorted(np.cumsum(SHARES), grid, side="right"))]
 
 
+ATTEMPTS = 10
 STRONG, LOUDEST = 3, 8  # draws of which a strong case takes the strongest, and a pair that should be seen
 
 
@@ -105,11 +105,13 @@ def draw(
     strong: bool = False,
     pairs: bool = False,
     rest: bool = False,
+    aimed: bool = False,
 ) -> Probing:
     """The case with this seed and number (minutes of one core); redrawn if a body finds no equilibrium.
 
     Args:
         rest: one or two effects beside a rest in the force that no catalogue has, or the rest alone.
+        aimed: effects at sizes where it is open whether they can be told (`probing_aims`), which take turns.
     """
     menu, draws = (LOUD, LOUDEST) if pairs else (CATALOGUED, STRONG if strong or rest else 1)
     if strong:
@@ -118,15 +120,18 @@ def draw(
         kind, turn = "two", index
     if rest:
         kind = rest_category(index)
+    goal = aim(index) if aimed else None
+    if goal:
+        kind = {1: "one", 2: "two"}[len(goal.effects)]
     with threadpool_limits(1):
-        for attempt in range(6):
+        for attempt in range(ATTEMPTS):
             rng = np.random.default_rng([seed, index, attempt, 2])
             try:
                 kind, turn = kind or category(index), index if turn is None else turn
-                return _draw(name, rng, kind, turn, mesh, menu, draws, rest)
+                return _draw(name, rng, kind, turn, mesh, menu, draws, rest, goal)
             except NotConverged:
                 continue
-    raise NotConverged(f"probing case {name}: no equilibrium in 6 draws; choose another seed")
+    raise NotConverged(f"probing case {name}: no equilibrium in {ATTEMPTS} draws; choose another seed")
 
 
 def _draw(
@@ -138,12 +143,13 @@ def _draw(
     menu: tuple[Course, ...],
     draws: int,
     rest: bool = False,
+    goal: Aim | None = None,
 ) -> Probing:
     lobe = body(rng)
     C10 = float(np.exp(rng.uniform(np.log(400), np.log(1000))))
     tissue = Tissue(C10, C10 * float(rng.uniform(0.3, 1.1)), float(np.exp(rng.uniform(np.log(1.8e4), np.log(4.2e4)))))
     radius = float(rng.choice([0.0095, 0.0095, 0.0095, 0.00625]))
-    added = [c.ingredient(rng, C10, draws) for c in courses(rng, kind, turn, menu)]
+    added = [c.ingredient(rng, C10, draws) for c in (goal.courses if goal else courses(rng, kind, turn, menu))]
     sites = [(x + rng.uniform(-1.5e-3, 1.5e-3), y + rng.uniform(-1.5e-3, 1.5e-3)) for x, y in rng.permutation(SITES)]
     styles = [str(s) for s in rng.permutation(["side", "twice", "once"])]
     if rng.random() < 0.3:
@@ -155,39 +161,28 @@ def _draw(
     noise = (0.003, float(np.round(rng.uniform(50e-6, 85e-6), 6)))
     rho = float(rng.uniform(0.4, 0.85)) if rng.random() < 0.3 else 0.0
 
-    solved: dict = {}
+    setup, solved = Setup(lobe, tissue, sites, radius, places, mesh), {}
+    visits = [Visit(i, paths[i], (float(starts[i]), float(starts[-1])), float(phases[i])) for i in range(3)]
 
     def recorded(ingredients: list[Ingredient], count: int = 3) -> list[Record]:
-        clocks = [(start, starts[-1]) for start in starts]
-        return [
-            record(
-                lobe,
-                tissue,
-                ingredients,
-                paths[i],
-                sites[i],
-                sites,
-                radius,
-                places,
-                i,
-                clocks[i],
-                phases[i],
-                mesh,
-                solved,
-            )
-            for i in range(count)
-        ]
+        return [record(setup, visit, ingredients, solved) for visit in visits[:count]]
 
+    if goal:
+        added = aimed_at(rng, goal, added, replace(setup, mesh=COARSE), visits[:2], noise)
+        goal.check({i.name: parts(recorded([], 2), recorded([i], 2), noise) for i in added})
     clean = recorded(added)
-    sizes = {}
+    sizes, more = {}, {}
     if added:
         bare = recorded([], 2)
+        more, each = {"where": where(by_channel(bare, clean[:2], noise))}, {}
         for one in added:
             alone = clean[:2] if len(added) == 1 else recorded([one], 2)
-            sizes[one.name] = beyond(bare, alone, noise)
-    more: dict = {}
+            each[one.name] = parts(bare, alone, noise)
+        sizes = {name: max(pair) for name, pair in each.items()}
+        if goal:
+            more |= {"aim": goal.name, "sizes_of_force_and_markers": each}
     if rest:
-        found = beside(rng, clean, recorded([]) if added else clean, list(sizes.values()), noise[0])
+        found = beside(rng, clean, recorded([]) if added else clean, list(sizes.values()), noise)
         clean, more = found.presses, found.key
     noisy, errors = [], {}
     for r in clean:
@@ -218,6 +213,24 @@ def _draw(
     return Probing(name, "reduced-polynomial-2", lobe, noisy, noise, key)
 
 
+def aimed_at(
+    rng: np.random.Generator,
+    goal: Aim,
+    drawn: list[Ingredient],
+    setup: Setup,
+    visits: list[Visit],
+    noise: tuple[float, float],
+) -> list[Ingredient]:
+    """The drawn effects, each at the amount that its aim asks of it alone, as found on the mesh of `setup`."""
+    solved: dict = {}
+    bare = [record(setup, v, [], solved) for v in visits]
+
+    def sizes(one: Ingredient) -> tuple[float, float]:
+        return parts(bare, [record(setup, v, [one], solved) for v in visits], noise)
+
+    return [goal.sized(rng, one, setup.tissue.C10, sizes) for one in drawn]
+
+
 def markers(rng: np.random.Generator, lobe: Lobe, sites: list, count: int) -> list[tuple[float, float]]:
     """Parameters of surface markers, away from where the probe touches and from each other."""
     found: list[tuple[float, float]] = []
@@ -230,30 +243,6 @@ def markers(rng: np.random.Generator, lobe: Lobe, sites: list, count: int) -> li
         if len(found) == count:
             break
     return found
-
-
-def beyond(bare: list[Record], full: list[Record], noise: tuple[float, float]) -> float:
-    """Rms over noise of what an effect leaves once the bare force is scaled to fit; force or markers, the larger.
-
-    The bare force is that along the path that was recorded, which is another one where the rig gives.
-    """
-    a = np.concatenate([along(e, f).ravel() for e, f in zip(bare, full, strict=True)])
-    b = np.concatenate([f.force.ravel() for f in full])
-    force = np.sqrt(np.mean((b - a * (a @ b) / (a @ a)) ** 2)) / noise[0]
-    seen = np.concatenate([(f.markers - e.markers).ravel() for e, f in zip(bare, full)])
-    return float(max(force, np.sqrt(np.mean(seen**2)) / noise[1]))
-
-
-def along(bare: Record, full: Record) -> Float[np.ndarray, "f 3"]:
-    """Force of the bare body, which is elastic, where `full` says the probe was: its vertical part by depth."""
-    here, there = (np.interp(bare.force_time, r.time, r.probe[:, 2]) for r in (bare, full))
-    if np.array_equal(here, there):
-        return bare.force
-    bins = np.digitize(here, np.linspace(here.min(), here.max(), DEPTHS)) - 1
-    filled = np.unique(bins)
-    depth, force = (np.array([np.mean(x[bins == k]) for k in filled]) for x in (here, bare.force[:, 2]))
-    by_depth = PchipInterpolator(depth, force)  # which goes on a little below the deepest
-    return bare.force + (by_depth(there) - by_depth(here))[:, None] * np.array([0.0, 0.0, 1.0])
 
 
 def write(case: Probing, path: File) -> None:

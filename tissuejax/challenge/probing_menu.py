@@ -19,6 +19,11 @@ def _turn(rng: np.random.Generator) -> list[float]:
     return [float(np.cos(angle)), float(np.sin(angle))]
 
 
+def _moment(rng: np.random.Generator) -> dict:
+    """Something happens in one of the two recordings that are fitted, at a share of its time."""
+    return {"number": int(rng.integers(2)), "where": float(rng.uniform(0.25, 0.6))}
+
+
 @dataclass(frozen=True)
 class Course:
     """One effect on the menu.
@@ -100,19 +105,19 @@ CATALOGUED = (
     Course("energy-form", lambda r, c: (_log(r, 1, 10) * c, {}), solved=True),
 )
 
+# What no catalogue has: the support lets go, links form while held, tissue tears once, the cell is warmed at once and
+# cools, the tip turns under its load, a tracker slides to a neighbour of its marker.
 STRAY = (
     Course(
         "tissue-slip",
         lambda r, c: (_log(r, 4e-4, 1.5e-3), {"way": [*_turn(r), -0.3], "where": float(r.uniform(0.3, 0.7))}),
         solved=True,
     ),
-    Course("rubbing", lambda r, c: (_log(r, 6e-3, 4e-2), {"travel": _log(r, 2e-4, 1e-3)})),
-    Course(
-        "warmed",
-        lambda r, c: (_log(r, 0.03, 0.25), {"period": float(r.uniform(1.5, 4)), "phase": float(r.uniform(0, 6))}),
-    ),
-    Course("saturated", lambda r, c: (_log(r, 0.05, 0.4), {})),
     Course("cured", lambda r, c: (_log(r, 0.05, 0.4), {"time": float(r.uniform(0.8, 2.5))})),
+    Course("torn", lambda r, c: (_log(r, 0.04, 0.3), _moment(r))),
+    Course("shock", lambda r, c: (_log(r, 8e-3, 5e-2), {**_moment(r), "time": _log(r, 0.4, 1.5)})),
+    Course("rolls", lambda r, c: (_log(r, 0.04, 0.4), {"axis": _turn(r)})),
+    Course("marker-jump", lambda r, c: (_log(r, 0.05, 0.5), {**_moment(r), "which": float(r.random())})),
 )
 
 NAMES = tuple(c.name for c in CATALOGUED)

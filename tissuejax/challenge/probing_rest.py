@@ -6,6 +6,7 @@ import numpy as np
 
 from tissuejax.challenge.places import most_of, shares
 from tissuejax.challenge.probing_bench import Record as Press
+from tissuejax.challenge.probing_sizes import by_channel, where
 from tissuejax.challenge.rests import rests
 from tissuejax.challenge.rests.rest import Record, together
 from tissuejax.challenge.specimen import Trial
@@ -29,13 +30,15 @@ def trial(press: Press) -> Trial:
     return Trial(press.name, "simple-shear", press.force_time, depth, np.eye(3)[2], press.start, 1.0, 1.0, 1.0)
 
 
-def beside(rng: np.random.Generator, clean: list[Press], bare: list[Press], sizes: list[float], noise: float) -> Beside:
+def beside(
+    rng: np.random.Generator, clean: list[Press], bare: list[Press], sizes: list[float], noise: tuple[float, float]
+) -> Beside:
     """Add a rest of two or three laws, a drawn share of the weakest effect; the last press is held out.
 
     Args:
         clean: with the effects; bare: without any.
         sizes: of the effects over the noise; none for a rest alone.
-        noise: of the force, N.
+        noise: of force and markers, N and m.
     """
     own = [trial(p) for p in clean]
     top = max(float(np.abs(p.force).max()) for p in clean)
@@ -51,7 +54,7 @@ def beside(rng: np.random.Generator, clean: list[Press], bare: list[Press], size
         return [f - scale * g for f, g in zip(forces, base)]
 
     def size(forces: list[np.ndarray]) -> float:
-        return float(np.sqrt(np.mean(np.concatenate([x.ravel() for x in left(forces)[:-1]]) ** 2)) / noise)
+        return float(np.sqrt(np.mean(np.concatenate([x.ravel() for x in left(forces)[:-1]]) ** 2)) / noise[0])
 
     ratio = float(np.exp(rng.uniform(*np.log(RATIO))))
     strength = min(sizes) if sizes else float(np.exp(rng.uniform(*np.log(SIZE))))
@@ -71,7 +74,8 @@ def beside(rng: np.random.Generator, clean: list[Press], bare: list[Press], size
             "beyond_rms": {p.name: float(np.sqrt(np.mean(x**2))) for p, x in zip(clean, lacking)},
         },
         "samples": {p.name: len(p.force_time) for p in clean},
-        "where": {
+        "where": where(by_channel(bare[:-1], presses[:-1], noise))
+        | {
             "shares": gap,
             "recordings": most_of(gap["recordings"]),
             "phases": most_of(gap["phases"]),

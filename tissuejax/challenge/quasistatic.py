@@ -1,7 +1,7 @@
-"""Equilibrium of a probed body along a path of the probe: Newton's method with a banded Cholesky factor.
+"""Equilibrium of a probed body along a path of the probe: Newton's method with a banded Cholesky factor that is kept.
 
-Nodes are numbered so that the tangent is a band; the support is a bed of springs, stiff where tissue is held, softer
-(and with a yield) sideways where it can slip.
+Nodes are numbered so that the tangent is a band (`banded`); the support is a bed of springs, stiff where tissue is
+held, softer (and with a yield) sideways where it can slip.
 """
 
 from collections.abc import Callable
@@ -9,15 +9,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.linalg import lapack
 
+from tissuejax.challenge.banded import Band, Kept
 from tissuejax.challenge.solid import Solid
 from tissuejax.challenge.touch import Membrane, Sphere
 from tissuejax.errors import NotConverged
 
 HELD = 1e6  # N/m per node
-CLOSE = 1e-5  # N, largest residual of a node: of the force a hundredth of the noise
-SLOW = 0.5  # of the residual left by an iteration: the body's tangent is computed anew
+CLOSE = 2e-6  # N, largest residual of a node: half a micrometre, and of the force less than a hundredth of the noise
+PATIENCE = 5.0  # iterations still to come, at the last one's pace, from which a new tangent of the body costs less
+MARGIN = 1.2e-3  # m from the probe: what may come to touch it before the body's tangent is computed anew
+SETTLED = 2e-9  # m, of the surface under the probe, when its contact is solved for
 
 
 @dataclass
@@ -32,42 +34,6 @@ class Bed:
     sideways: float | None = None
     strength: float | None = None
     slid: np.ndarray | float = 0.0
-
-
-class Band:
-    """Lower band of a symmetric matrix assembled from blocks."""
-
-    def __init__(self, nodes_of: dict[str, np.ndarray], n_nodes: int):
-        dofs = {k: (3 * v[:, :, None] + np.arange(3)).reshape(len(v), -1) for k, v in nodes_of.items()}
-        self.n = 3 * n_nodes
-        self.width = max(int((d.max(1) - d.min(1)).max()) for d in dofs.values() if len(d))
-        self.keep, self.at = {}, {}
-        for k, d in dofs.items():
-            row, col = np.broadcast_arrays(d[:, :, None], d[:, None, :])
-            self.keep[k] = (row >= col).ravel()
-            self.at[k] = (col * (self.width + 1) + row - col).ravel()[self.keep[k]]
-        self.dofs = dofs
-
-    def matrix(self, name: str, K: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
-        """Blocks of one kind and a diagonal as a flat band, column after column, in single precision."""
-        size = self.n * (self.width + 1)
-        flat = np.bincount(self.at[name], K.ravel()[self.keep[name]], size).astype(np.float32)
-        flat[:: self.width + 1] += diagonal.astype(np.float32)
-        return flat
-
-    def added(self, flat: np.ndarray, blocks: dict[str, np.ndarray]) -> np.ndarray:
-        """(width + 1, n) lower band in Fortran order: a flat one and (few) further blocks."""
-        flat = flat.copy()
-        for k, K in blocks.items():
-            np.add.at(flat, self.at[k], K.ravel()[self.keep[k]].astype(np.float32))
-        return flat.reshape(self.n, self.width + 1).T
-
-    def vector(self, blocks: dict[str, np.ndarray]) -> np.ndarray:
-        """Sum of block forces, (n,)."""
-        total = np.zeros(self.n)
-        for k, f in blocks.items():
-            total += np.bincount(self.dofs[k].ravel(), f.ravel(), self.n)
-        return total
 
 
 @dataclass
@@ -93,6 +59,7 @@ class Bench:
         areas = np.abs(np.cross((x[:, 2] - x[:, 0])[:, :2], (x[:, 3] - x[:, 1])[:, :2])) / 2
         np.add.at(size, base, areas[:, None] / 4)
         self.base, self.size = grid.base, size[grid.base]
+        self.kept: Kept | None = None
         self.factorizations = 0
 
     def _bed(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -135,8 +102,8 @@ class Bench:
     ) -> Float[np.ndarray, "3"]:
         """Move the probe to `centre` within `dt` and return the force on it, N.
 
-        The tangent of the body, which costs most, is kept over iterations as long as they converge well; that of the
-        contact is always new.
+        The tangent of the body, which costs most, is kept over iterations and steps as long as they converge well;
+        in every iteration the contact is solved for to the end.
 
         Raises:
             NotConverged: no equilibrium found.
@@ -146,16 +113,13 @@ class Bench:
         if "bad" in now or guess is not None and np.abs(now["r"]).max() > 50:
             u = self.u
             now = self._all(u, centre, dt)
-        body = None
         for iteration in range(48):
             self.sphere.caution = min(iteration // 12, 2)
             worst = np.abs(now["r"]).max()
             if worst < CLOSE:
                 self._accept(u, now)
                 return now["parts"]["sphere"]["probe"]
-            if body is None:
-                body = self._body(u, now, dt)
-            du = self._solve(self.band.added(body, {"sphere": now["parts"]["sphere"]["K"]}), now["r"])
+            du = self._way(u, now, centre, dt)
             size = np.abs(du).max()
             cut = min(1.0, 1.5e-3 / size)
             for _ in range(12):
@@ -166,21 +130,70 @@ class Bench:
             else:
                 break
             u, now = u - cut * du.reshape(u.shape), trial
-            if np.abs(now["r"]).max() > SLOW * worst:
-                body = None
+            left = np.abs(now["r"]).max()
+            if left > worst * (CLOSE / max(left, CLOSE)) ** (1 / PATIENCE):
+                self.kept = None
+        self.kept = None
         raise NotConverged(f"probed body: no equilibrium (largest residual {np.abs(now['r']).max():.2g} N)")
 
-    def _solve(self, band: np.ndarray, r: np.ndarray) -> np.ndarray:
-        self.factorizations += 1
-        shift = 0.0
-        for _ in range(8):
-            trial = band.copy(order="F")
-            trial[0] += np.float32(shift)
-            factor, info = lapack.spbtrf(trial, lower=1, overwrite_ab=1)
-            if info == 0:
-                return lapack.spbtrs(factor, r.astype(np.float32), lower=1)[0].astype(float)
-            shift = max(10 * shift, 0.05)
-        raise NotConverged("probed body: the tangent stays indefinite")
+    def _way(self, u: np.ndarray, now: dict, centre: np.ndarray, dt: float) -> np.ndarray:
+        """What to take off `u`: the body as its kept tangent has it, with the contact that then comes about."""
+        touch = now["parts"]["sphere"]
+        gap = np.linalg.norm(touch["x"], axis=-1).min(1) - self.sphere.radius
+        dofs = self.band.dofs["sphere"]
+        if self.kept is None:
+            self.factorizations += 1
+            self.kept = Kept(self.band, self._body(u, now, dt))
+        kept = self.kept
+        on = np.any(touch["K"], axis=(1, 2))
+        if not np.isin(dofs[on | (gap < MARGIN / 3)], kept.dofs).all():
+            kept.reach(np.unique(dofs[on | (gap < MARGIN)]))
+        force = self.band.vector({"sphere": touch["f"]})
+        rest = now["r"].copy()
+        rest[kept.dofs] -= force[kept.dofs]
+        if len(kept.dofs):
+            rest[kept.dofs] += self._contact(kept, u, centre, -kept.back(rest)[kept.dofs])
+        return kept.back(rest)
+
+    def _contact(self, kept: Kept, u: np.ndarray, centre: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """Forces of the contact on the kept dofs, which would move by `free` without it: d + C f(u + d) = free.
+
+        Where that does not settle, those of a single step of Newton's method.
+        """
+        dofs, C = kept.dofs, kept.compliance
+        place = np.full(self.band.n, len(dofs))
+        place[dofs] = np.arange(len(dofs))
+        rows = place[self.band.dofs["sphere"]]
+
+        def tried(d: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            moved = u.copy()
+            moved.reshape(-1)[dofs] += d
+            state = self.sphere.state(moved, centre, True)
+            f = self.band.vector({"sphere": state["f"]})[dofs]
+            return d + C @ f - free, f, state["K"]
+
+        d = np.zeros(len(dofs))
+        off, f, K = tried(d)
+        first = f
+        for iteration in range(40):
+            if np.abs(off).max() < SETTLED:
+                return f
+            self.sphere.caution = min(iteration // 8, 2)
+            some = np.flatnonzero(np.any(K, axis=(1, 2)))
+            stiff = np.zeros((len(dofs) + 1, len(dofs) + 1))
+            np.add.at(stiff, (rows[some][:, :, None], rows[some][:, None, :]), K[some])
+            way = np.linalg.solve(np.eye(len(dofs)) + C @ stiff[:-1, :-1], off)
+            if iteration == 0:
+                first = f - stiff[:-1, :-1] @ way
+            cut = min(1.0, 1.5e-3 / np.abs(way).max())
+            for _ in range(5):
+                new = d - cut * way
+                trial = tried(new)
+                if np.linalg.norm(trial[0]) < (30 if iteration < 20 else 1) * np.linalg.norm(off):
+                    break
+                cut /= 2.5
+            d, (off, f, K) = new, trial
+        return first
 
     def _accept(self, u: np.ndarray, now: dict) -> None:
         self.u = u

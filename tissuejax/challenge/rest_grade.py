@@ -9,6 +9,7 @@ import numpy as np
 
 from tissuejax.challenge import files
 from tissuejax.challenge.calibration import calibration
+from tissuejax.challenge.places import channel_f1, f1
 from tissuejax.challenge.rates import rate, spread
 from tissuejax.challenge.rest_marks import FACTOR, NO_PROCESS, RestMark, mark_rest
 from tissuejax.challenge.verdicts import SETTLED
@@ -75,12 +76,12 @@ def summary(marks: list[RestMark]) -> dict:
         law: rate([m for m in marks if law in m.laws], lambda m: bool(m.wrong))
         for law in sorted({x for m in marks for x in m.laws})
     }
-    right, false, missed = (sum(m.where[i] for m in marks) for i in range(3))
     return {
         "rates": rates,
         "by_ratio": by_ratio,
         "a wrong name, by law of the rest": by_law,
-        "where_f1": 2 * right / (2 * right + false + missed) if right + false + missed else None,
+        "where_f1": f1(m.where for m in marks),
+        "channel_f1": channel_f1([m.channels for m in marks]),
         "rest_over_true": spread([m.rest_over_true for m in marks if math.isfinite(m.rest_over_true)]),
         "kept_error_over_rest": spread([m.kept_ratio for m in marks if math.isfinite(m.kept_ratio)]),
         "calibration": calibration(marks),
@@ -96,6 +97,7 @@ def rows(marks: list[RestMark]) -> list[dict]:
         for name in ("truth", "laws", "named", "best", "wrong"):
             row[name] = " + ".join(row[name])
         row["where"] = "/".join(map(str, m.where))
+        row["channels"] = "/".join(map(str, m.channels or ()))
         out.append({k: (f"{v:.4g}" if isinstance(v, float) else v) for k, v in row.items()})
     return out
 

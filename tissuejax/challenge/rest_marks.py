@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from tissuejax.challenge.places import agreement, stated
+from tissuejax.challenge.places import agreement, channels_found, stated
 from tissuejax.challenge.verdicts import SETTLED, names_in, tried
 
 NO_PROCESS = ("energy-form", "specimen-scatter")  # claim no process in tissue or rig; reported apart on a rest alone
@@ -29,6 +29,7 @@ class RestMark:
         tried: whether a set with exactly these effects was fitted; None where the result doesn't list its sets.
         rest_over_true: stated size of the rest over the true one, rms; nan where none is stated.
         where: (right, false, missed) places, recordings and phases together.
+        channels: the same of a probing's channels; None where the key names none.
         confidence: as stated, or nan.
         kept_ratio: rms error on the recording that nothing read over the rms of the true rest there; nan if unknown.
         seconds: wall time.
@@ -49,6 +50,7 @@ class RestMark:
     tried: bool | None
     rest_over_true: float
     where: tuple[int, int, int]
+    channels: tuple[int, int, int] | None
     confidence: float
     kept_ratio: float
     seconds: float
@@ -107,6 +109,7 @@ def mark_rest(name: str, key: dict, result: dict, seconds: float = math.nan, kep
         tried=tried(truth, result),
         rest_over_true=rest_size(result) / true_size(key),
         where=(a[0] + b[0], a[1] + b[1], a[2] + b[2]),
+        channels=channels_found(key, result),
         confidence=float(confidence) if isinstance(confidence, int | float) else math.nan,
         kept_ratio=kept / key["kept_rms"]["rest"],
         seconds=seconds,

@@ -27,21 +27,21 @@ def slip_event(trial: Trial, amount: float, where: float) -> History:
     return -np.sign(strain[at]) * amount * after
 
 
-def saturated(P: History, amount: float) -> History:
-    """Sensor that clips at (1 - amount) of the largest stress."""
-    limit = (1 - amount) * np.abs(P).max()
-    return np.clip(P, -limit, limit)
-
-
 def stepped(P: History, amount: float) -> History:
     """Coarse converter: steps of `amount`, Pa."""
     return amount * np.round(P / amount)
 
 
-def warmed(trial: Trial, P: History, amount: float, period: float, phase: float) -> History:
-    """Stiffness that waxes and wanes with the room's temperature, as a factor on the stress."""
-    t = trial.time + trial.start
-    return P * (1 + amount * np.sin(2 * np.pi * t / period + phase)).reshape(-1, *([1] * (P.ndim - 1)))
+def torn(trial: Trial, P: History, amount: float, at: float) -> History:
+    """A region of the specimen tears once, `at` s after the first recording began: it bears no load from then on."""
+    gone = trial.time + trial.start >= at
+    return P * (1 - amount * gone).reshape(-1, *([1] * (P.ndim - 1)))
+
+
+def shock(trial: Trial, amount: float, at: float, time: float) -> Float[np.ndarray, " n"]:
+    """Shift of a load cell that is warmed at once and cools: rises to `amount` (Pa) within `time` s, then decays."""
+    since = np.maximum(trial.time + trial.start - at, 0) / time
+    return amount * since * np.exp(1 - since)
 
 
 def cured(trial: Trial, P: History, amount: float, time: float) -> History:

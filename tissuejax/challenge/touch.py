@@ -101,8 +101,11 @@ class Sphere:
         left["f"] = np.einsum("qa,fqd->fad", self.N, weighted)
         left["probe"] = weighted.sum((0, 1))
         if tangent:
+            on = np.flatnonzero(np.any((slope != 0) | (pressure != 0), axis=1))
             NN = self.N[:, :, None] * self.N[:, None, :]
-            left["K"] = np.einsum("qab,fqij->faibj", NN, K * self.area[..., None, None]).reshape(-1, 12, 12)
+            left["K"] = np.zeros((len(self.facets), 12, 12))
+            some = np.einsum("qab,fqij->faibj", NN, K[on] * self.area[on][..., None, None])
+            left["K"][on] = some.reshape(-1, 12, 12)
         return left
 
     def accept(self, left: dict) -> None:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tissuejax.challenge.places import channels_found
+
 SETTLED = ("found", "found-in-part", "ambiguous")  # verdicts that name something
 
 
@@ -33,6 +35,7 @@ class Mark:
         held_out_ratio: rms error on the held-out recording over that of the truth itself; nan if not reported.
         confidence: as stated, or nan.
         seconds: wall time.
+        channels: (right, false, missed) channels of a probing's misfit; None where the key names none.
     """
 
     name: str
@@ -55,6 +58,7 @@ class Mark:
     held_out_ratio: float
     confidence: float
     seconds: float
+    channels: tuple[int, int, int] | None
 
 
 # One law of the challenge is another effect in a probing or a cut than in a material test; sealed keys have its name.
@@ -148,6 +152,7 @@ def mark(name: str, key: dict, result: dict, seconds: float = math.nan) -> Mark:
         held_out_ratio=held_out_ratio(key, result),
         confidence=_number(result.get("confidence")),
         seconds=seconds,
+        channels=channels_found(key, result),
     )
 
 

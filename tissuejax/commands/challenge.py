@@ -60,6 +60,12 @@ says what simpler ways of answering would have said on the same cases.
         parser.add_argument(
             "--rest", action="store_true", help="make: probings with a rest in the force that no catalogue has"
         )
+        parser.add_argument(
+            "--aimed",
+            action="store_true",
+            help="make: probings where it is open whether the effect can be told: a base slip in the markers alone, "
+            "a registration near the noise, an energy form beside friction or drift",
+        )
         parser.add_argument("--jobs", "-j", type=int, default=1, metavar="N", help="make, run: processes (default 1)")
         parser.add_argument("--case", action="append", default=[], metavar="NAME", help="run: only this case (repeat)")
         parser.add_argument("--again", action="store_true", help="run: diagnose again what has a result")
@@ -69,8 +75,17 @@ says what simpler ways of answering would have said on the same cases.
         """Do one of the four."""
         positive(given.jobs, "--jobs")
         if given.action == "make":
-            which = {"strong": given.strong, "pairs": given.pairs, "rest": given.rest, "commit": given.commit}
-            made = make(given.folder, given.kind, given.count, given.seed, given.jobs, for_terminal(), **which)
+            which = {"strong": given.strong, "pairs": given.pairs, "rest": given.rest, "aimed": given.aimed}
+            made = make(
+                given.folder,
+                given.kind,
+                given.count,
+                given.seed,
+                given.jobs,
+                for_terminal(),
+                commit=given.commit,
+                **which,
+            )
             text = (
                 f"{len(made['cases'])} {given.kind} cases in {given.folder}\nkeys sealed, sha256 {made['keys_sha256']}"
             )
@@ -93,4 +108,6 @@ says what simpler ways of answering would have said on the same cases.
         for name, r in found["rates"].items():
             if r["of"]:
                 lines.append(f"  {name:<58}{r['share']:>6.0%}  ({r['low']:.0%} to {r['high']:.0%}, n = {r['of']})")
+        if (shown := found["channel_f1"])["of"]:
+            lines.append(f"  {'channels that show the misfit: F1':<58}{shown['f1']:>6.2f}  (n = {shown['of']})")
         return Reply(found, "\n".join(lines))
