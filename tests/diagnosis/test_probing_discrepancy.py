@@ -53,7 +53,8 @@ def left(presses, added, seed=0):
 def test_noise_leaves_no_part_of_note(presses):
     found, parts, cut = left(presses, np.zeros(len(presses[1])))
     assert max(found.values()) < 0.006
-    assert {p.family for p in parts} == {"law", "gain", "hysteresis", "onset", "slow", "marker", "white"}
+    families = {"law", "gain", "hysteresis", "onset", "slow", "marker", "marker gain", "crosstalk", "white"}
+    assert {p.family for p in parts} == families
     for part in parts:
         if part.within is not None:
             assert sum(len(b) for b in part.within) == len(cut.starts)
