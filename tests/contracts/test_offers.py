@@ -33,7 +33,8 @@ def test_an_offer_speaks_of_the_effect_s_own_parameters(key):
     assert len({f.name for f in offer.forms}) == len(offer.forms)
     for form in offer.forms:
         assert set(form.free) <= set(declared)
-        assert bool(set(form.free) & set(offer.effect.amplitudes)) != bool(form.widens), "nothing, or both, to be neutral"
+        neutral = bool(set(form.free) & set(offer.effect.amplitudes))
+        assert neutral != bool(form.widens), "a form without an amplitude can't be neutral"
         assert not (form.widens and form.free), "a form that widens the discrepancy has no parameters"
         assert set(form.lacking) <= set(Protocol.__annotations__), "no property of a protocol"
         assert {*form.widens, *(f for more in form.lacking.values() for f in more)} <= set(Criteria().shares)

@@ -41,7 +41,8 @@ recordings; --effect switches one on in a fit or a simulation, --with tells a di
         record = {name: _record(name, kind) for name, kind in found.items()}
         lines = []
         for name, one in record.items():
-            shown = ", ".join(f"{p}{'' if d['unit'] == '1' else f' ({d["unit"]})'}" for p, d in one["parameters"].items())
+            units = {p: "" if d["unit"] == "1" else f" ({d['unit']})" for p, d in one["parameters"].items()}
+            shown = ", ".join(f"{p}{unit}" for p, unit in units.items())
             lines += [
                 name,
                 f"    {one['what']}",

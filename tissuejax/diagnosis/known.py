@@ -41,8 +41,8 @@ def known_physics(given: Sequence[str], kind: str) -> Known:
             raise unknown("effect", name, sorted(effects(kind)))
         elif not declared_of(name):
             raise InputError(
-                f"{item!r}: {name} has no parameters that could be stated: it is a part of the discrepancy, which every "
-                "diagnosis weighs; leave it out of what is known"
+                f"{item!r}: {name} has no parameters that could be stated: it is a part of what any law leaves, which "
+                "every diagnosis weighs; leave it out of what is known"
             )
         values = found.setdefault(name, {})
         if parameter or text:

@@ -61,12 +61,12 @@ def probing_discrepancy(view: ProbingView, cut: Blocks) -> ProbingDiscrepancy:
     Law: smooth in depth times the prediction, common to all recordings. Gain, own law: of each recording's own. Onset:
     of each recording's own too, a surface that is met too early or late, by a share of the depth (facets, softness of
     contact, how well the body is placed): of a force like depth^n, n times that over the depth. None of them holds a
-    constant share of all forces (see `ProbingDiscrepancy.about`). Gains of markers are a family of their own. Hysteresis:
-    a share of the predicted force too, of each axis alike (in units of the largest force it would be as large along the
-    axes that feel nothing), with none out of contact. Slow wander: in units of the channel's largest value. Marker:
-    smooth in depth times what the marker moved, of each component's own, since a marker is not quite where it was
-    registered. Crosstalk: a share of the vertical force in a lateral one, as load cells of several axes have it, and
-    meshes that are not symmetric.
+    constant share of all forces (see `ProbingDiscrepancy.about`). Gains of markers are a family of their own.
+    Hysteresis: a share of the predicted force too, of each axis alike (in units of the largest force it would be as
+    large along the axes that feel nothing), with none out of contact. Slow wander: in units of the channel's largest
+    value. Marker: smooth in depth times what the marker moved, of each component's own, since a marker is not quite
+    where it was registered. Crosstalk: a share of the vertical force in a lateral one, as load cells of several axes
+    have it, and meshes that are not symmetric.
     """
     segments = view.segments
     rows = [np.flatnonzero(cut.owner == k) for k in range(len(segments))]

@@ -19,14 +19,14 @@ FINEST = 4.0  # samples of the force in a period
 class ForceHum(Effect):
     """Reported force along z = force + sin a(t) `sin` + cos a(t) `cos`, a = 2 pi frequency t; markers feel nothing.
 
-    Along x and y `beside_x` and `beside_y` times that: what is picked up by the wires is in phase. Every recording has a
-    strength and a phase of its own, t counted from its beginning. A frequency above half the sampling rate is reported
-    at its alias.
+    Along x and y `beside_x` and `beside_y` times that: what wires pick up is in phase. Every recording has a strength
+    and a phase of its own, t counted from its beginning. A frequency above half the sampling rate is reported at its
+    alias.
 
     Revealed by a line in the periodogram of the force that markers lack, as strong out of contact. Blind: recordings of
-    fewer than 2.5 periods, fewer than 4 samples a period; what comes more than some twenty times in a recording averages
-    out of what a diagnosis weighs and is noise; without markers and always in contact it may be a support that moves.
-    Source: harmonic model, Lomb 1976, Astrophys. Space Sci. 39.
+    fewer than 2.5 periods, fewer than 4 samples a period; what comes more than some thirty times in a recording goes
+    from the block means that a diagnosis weighs, and is noise; without markers and always in contact it may be a
+    support that moves. Source: harmonic model, Lomb 1976, Astrophys. Space Sci. 39.
     """
 
     name: ClassVar[str] = "force-hum"

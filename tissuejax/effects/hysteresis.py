@@ -14,8 +14,8 @@ class Hysteresis(Widening):
 
     Revealed by a loop between loading and unloading, as wide at every rate. Blind: what never unloads; one rate alone,
     where relaxation makes a loop too. Width: 0.15 of the force to either side, so that loading and unloading are as far
-    apart as an effect of the tissue usually changes the stress (0.3, `Criteria.change`). Source: Ishlinskii 1944 (plays);
-    Fung 1993, sec. 7.6 (loops of tissue that rates hardly change).
+    apart as an effect of the tissue usually changes the stress (0.3, `Criteria.change`). Source: plays, Ishlinskii
+    1944; loops of tissue that rates hardly change, Fung 1993, sec. 7.6.
     """
 
     name: ClassVar[str] = "hysteresis"

@@ -14,8 +14,8 @@ class SpecimenScatter(Widening):
 
     Revealed by recordings that repeat themselves at another size, where they pass the same strains or depths. Blind: a
     single recording; recordings that share no strain (each may then follow one law somewhere else). Width: 0.3 of the
-    stress, as much as an effect of the tissue usually changes (`Criteria.change`). Source: a random gain and function of
-    each recording's own, Rasmussen and Williams 2006, sec. 2.7.
+    stress, as much as an effect of the tissue usually changes (`Criteria.change`). Source: a random gain and function
+    of each recording's own, Rasmussen and Williams 2006, sec. 2.7.
     """
 
     name: ClassVar[str] = "specimen-scatter"

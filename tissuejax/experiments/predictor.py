@@ -97,7 +97,7 @@ def predictor(model: Model, sample: Sample, names: Sequence[str] | None = None, 
             )
         if not effect.parameters:
             raise InputError(
-                f"effect {effect.name} has no parameters: there is nothing to predict or to fit. It is a part of what any "
-                f"law leaves, which `tissuejax diagnose` weighs. {effect.remedy}"
+                f"effect {effect.name} has no parameters: there is nothing to predict or to fit. It is a part of what "
+                f"any law leaves, which `tissuejax diagnose` weighs. {effect.remedy}"
             )
     return lookup("kind of experiment", kind, members(package, Predictor)).prepare(model, sample, names, **options)

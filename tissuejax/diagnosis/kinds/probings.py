@@ -13,8 +13,8 @@ from tissuejax.diagnosis.next_experiment import settling
 from tissuejax.diagnosis.next_probing import probing_proposals
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_discrepancy import probing_discrepancy
-from tissuejax.diagnosis.probing_offered import pressed
 from tissuejax.diagnosis.probing_map import stiffness_maps
+from tissuejax.diagnosis.probing_offered import pressed
 from tissuejax.diagnosis.probing_view import ProbingView, probing_blocks
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.estimation.discrepancy import Discrepancy
