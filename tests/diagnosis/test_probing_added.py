@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
-from tests.probing.bench import VALUES, recording, sample
+from tests.probing.bench import QUICK, VALUES, model, recording, sample
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_added import added, slope
 from tissuejax.diagnosis.probing_view import ProbingView
+from tissuejax.effects.catalogue import suited
 from tissuejax.energies.catalogue import energy
+from tissuejax.experiments.predictor import predictor
 from tissuejax.recordings.recording import Channel
 
 NAMES = ["force-drift", "force-hum"]
@@ -114,3 +116,15 @@ def test_a_hum_lies_where_the_recordings_can_show_it(bench):
 
 def _rows(bench, channel):
     return np.concatenate([np.r_[s.rows] for s in bench.segments if s.channel == channel])
+
+
+def test_a_quick_hum_is_read_at_the_sensors_times_and_not_between_frames():
+    """6 Hz read between frames of 40 ms by straight lines would be a quarter too small at the crests."""
+    p = predictor(model(suited("force-hum", "probing")), sample(), settings=QUICK)
+    force = [
+        p.predict(VALUES | {"effects.force-hum.sin.r1": x, "effects.force-hum.frequency": 6.0})["r1"].channels["force"]
+        for x in (0.0, 0.5)
+    ]
+    hum = np.asarray(force[1].values - force[0].values, float)
+    assert np.allclose(hum[:, 2], 0.5 * np.sin(2 * np.pi * 6.0 * np.asarray(force[0].time)), atol=1e-4)
+    assert not np.any(hum[:, :2])

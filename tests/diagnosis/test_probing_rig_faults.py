@@ -1,4 +1,4 @@
-"""Faults of a probe's force, put into it by other code than the catalogue's, are named by a diagnosis from end to end."""
+"""Faults of a probe's force, put into it by other code than the catalogue's, are named from end to end."""
 
 import numpy as np
 import pytest
