@@ -91,7 +91,7 @@ def test_a_drift_along_a_ramp_is_a_strain_energy():
 
 def test_what_remembers_the_way_is_a_strain_energy_until_it_comes_back():
     """Set and softening against a law of strain alone: alike on a ramp at any rate, unlike on the way back."""
-    on = [e for e in effects("homogeneous").values() if e.needs == "reversed"]
+    on = [e for e in effects("homogeneous").values() if e.needs == "reversed" and e().parameters]
     assert {e.name for e in on} >= {"permanent-set", "softening"}
     for kind in on:
         added = kind()
