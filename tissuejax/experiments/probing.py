@@ -150,7 +150,7 @@ def simulated(model: Model, values: Mapping[str, Array], setup: Setup) -> Simula
     shown: Mapping[str, Channel] = {name: Channel(times[name], read[name], channels[name].unit) for name in read}
     for effect in (e for e in outwards if type(e).added):  # of time alone: at the sensors' own, not between frames
         shown = effect.channels(under(f"effects.{effect.name}", values), setup.test, shown)
-    reported = {name: ch.values for name, ch in shown.items()}
+    reported = {name: jnp.asarray(ch.values) for name, ch in shown.items()}
     return Simulated(
         reported, out.failed, out.element, out.inertia, out.depth, ballast, out.state.u.T, pierced, out.hourglass,
         out.corner,
