@@ -5,7 +5,7 @@ import pytest
 
 from tissuejax.diagnosis.catalogue import Entry
 from tissuejax.diagnosis.probing_catalogue import probing_entries
-from tissuejax.diagnosis.probing_offered import LACKING, Pressed, asked, pressed
+from tissuejax.diagnosis.probing_offered import WITHOUT, Pressed, asked, pressed
 from tissuejax.effects.form import Probed
 from tissuejax.energies.catalogue import energy
 from tissuejax.estimation.series import Segment
@@ -46,7 +46,7 @@ def test_what_the_protocol_does_not_show_is_not_offered(segments, seen):
     kept, said = pressed(segments, candidates())
     assert {c.name for c in kept.values()} & set(asked()) == seen
     for name in set(asked()) - seen:
-        assert any(name in s and LACKING[asked()[name]] in s for s in said)
+        assert any(name in s and WITHOUT[asked()[name]] in s for s in said)
 
 
 def test_names_that_were_not_asked_for_are_not_offered():
@@ -59,4 +59,4 @@ def test_every_need_is_a_property_of_probings_and_has_words():
     assert set(asked()) == {"specimen-scatter", "hysteresis", "force-hum"}
     for need in asked().values():
         assert isinstance(getattr(protocol, need), bool)
-        assert LACKING[need]
+        assert WITHOUT[need]

@@ -82,5 +82,5 @@ def test_a_fault_of_the_force_is_named(simulated, name):
         values, std = found.chosen.values, found.chosen.std
         path = "effects.force-hum.frequency"
         assert abs(values[path] - FREQUENCY) < 4 * std[path]
-        sizes = [np.hypot(values[f"effects.force-hum.sin.{r}"], values[f"effects.force-hum.cos.{r}"]) for r in "a"]
-        assert sizes[0] == pytest.approx(HUM, rel=0.1)
+        size = np.hypot(*(values[f"effects.force-hum.{part}.a"] for part in ("sin", "cos")))
+        assert size == pytest.approx(HUM, rel=0.1)

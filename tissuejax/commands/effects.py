@@ -7,9 +7,9 @@ from typing import ClassVar
 from tissuejax.commands.command import Command, Reply
 from tissuejax.effects.catalogue import declared, effects
 from tissuejax.effects.effect import Effect
+from tissuejax.experiments.predictor import WORDS
 from tissuejax.families import lookup
 
-WHERE = {"homogeneous": "material tests", "probing": "probings", "cutting": "cuts"}
 NONE = "none: it is weighed by `diagnose` as a part of what any law leaves, and is nothing to fit"
 
 
@@ -31,7 +31,7 @@ recordings; --effect switches one on in a fit or a simulation, --with tells a di
     def arguments(self, parser: argparse.ArgumentParser) -> None:
         """NAME, or --of KIND."""
         parser.add_argument("effect", metavar="NAME", nargs="?", help="this effect alone")
-        parser.add_argument("--of", choices=sorted(WHERE), help="only those that act in such recordings")
+        parser.add_argument("--of", choices=sorted(WORDS), help="only those that act in such recordings")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """The list."""
@@ -46,7 +46,7 @@ recordings; --effect switches one on in a fit or a simulation, --with tells a di
             lines += [
                 name,
                 f"    {one['what']}",
-                f"    acts in        {', '.join(WHERE[k] for k in one['kinds'])}",
+                f"    acts in        {', '.join(WORDS[k] for k in one['kinds'])}",
                 f"    revealed by    {one['reveals']}",
                 f"    blind to it    {one['blind']}",
                 f"    parameters     {shown or NONE}",

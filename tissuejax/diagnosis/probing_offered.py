@@ -10,7 +10,7 @@ from tissuejax.diagnosis.offered import motion, shown, widened
 from tissuejax.effects.catalogue import effects
 from tissuejax.estimation.series import Segment
 
-SAMPLES = 20  # of the force: four in each of five periods, so that a hum has a range of frequencies to lie in
+ENOUGH = 20  # of the force: four in each of five periods, so that a hum has a range of frequencies to lie in
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,11 @@ class Pressed:
         return cls(
             several=len({s.recording for s in deep}) > 1,
             reversed=any(motion(np.asarray(s.time), np.asarray(s.drive))[0] for s in deep),
-            sampled=max((len(s.time) for s in forces), default=0) >= SAMPLES,
+            sampled=max((len(s.time) for s in forces), default=0) >= ENOUGH,
         )
 
 
-LACKING: Mapping[str, str] = {  # property of the probings: what is said where it is not there
+WITHOUT: Mapping[str, str] = {  # property of the probings: what is said where it is not there
     "several": "there is one force only, whose gain is that of the moduli",
     "reversed": "no force was measured while the probe went back",
     "sampled": "the force has too few samples to hold some periods",
@@ -62,4 +62,4 @@ def pressed(
         names: effects asked for; all by default.
     """
     protocol = Pressed.of(segments)
-    return shown(widened(candidates, protocol, names), protocol, asked(), LACKING)
+    return shown(widened(candidates, protocol, names), protocol, asked(), WITHOUT)

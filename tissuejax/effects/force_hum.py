@@ -8,11 +8,11 @@ from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
 from tissuejax.effects.form import Form, Offer, Probed
+from tissuejax.effects.periodic import CYCLES
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.recordings.recording import Channel
 
-CYCLES = 2.5  # periods that the longest recording must hold to show one
 FINEST = 4.0  # samples of the force in a period
 
 
