@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
+from tests.probing.bench import recording, sample
 from tissuejax.diagnosis.catalogue import Entry
+from tissuejax.diagnosis.kinds.probings import Probings
+from tissuejax.diagnosis.kinds.recorded import Question
+from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_catalogue import probing_entries
 from tissuejax.diagnosis.probing_offered import WITHOUT, Pressed, asked, pressed
 from tissuejax.effects.form import Probed
@@ -60,3 +64,13 @@ def test_every_need_is_a_property_of_probings_and_has_words():
     for need in asked().values():
         assert isinstance(getattr(protocol, need), bool)
         assert WITHOUT[need]
+
+
+def test_a_diagnosis_of_one_press_is_told_what_it_can_not_show(monkeypatch):
+    monkeypatch.setattr(ProbingBench, "_scale", lambda self: 1.0)  # nothing is simulated here
+    question = Question(sample(recording("a")), energy("neo-hookean"), "neo-hookean", ("a",), (), {}, None, None)
+    made = Probings.of(question)
+    names = {c.name for c in made.whole.candidates.values()}
+    assert {"hysteresis", "force-hum", "friction"} <= names
+    assert "specimen-scatter" not in names
+    assert any("specimen-scatter" in s and "one force only" in s for s in made.remarks)
