@@ -51,6 +51,18 @@ def test_the_catalogue(capsys):
     assert "in-vivo-3" in record["published"]
 
 
+def test_the_catalogue_of_effects(capsys):
+    code, record = answer(capsys, "effects")
+    assert code == 0
+    found = record["effects"]
+    assert {"friction", "drift", "hysteresis", "specimen-scatter", "force-hum", "dulling"} <= set(found)
+    assert all(e["what"] and e["reveals"] and e["blind"] and e["source"] and e["kinds"] for e in found.values())
+    assert all(e["parameters"] or e["remedy"] for e in found.values()), "neither a fit nor a word on what to do"
+    _, record = answer(capsys, "effects", "--of", "cutting")
+    assert "dulling" in record["effects"]
+    assert "friction" not in record["effects"]
+
+
 def test_a_picture_of_an_energy(capsys, tmp_path):
     code, record = answer(capsys, "energies", "--plot", "in-vivo-1", "--out", str(tmp_path))
     assert code == 0
@@ -148,7 +160,9 @@ def test_not_converged_is_exit_code_3_and_still_writes(capsys, tmp_path):
         (["fit", ELASTIC, *YEOH, "--multistart", "0"], "1 or more"),
         (["fit", "nowhere.h5", *YEOH], "no such file"),
         (["inspect", str(ROOT / "LICENSE")], "another format"),
+        (["fit", ELASTIC, *YEOH, "--effect", "hysteresis"], "hysteresis has no parameters: there is nothing"),
         (["energies", "--plot", "gentle"], "Did you mean 'gent'"),
+        (["effects", "hysteresys"], "Did you mean 'hysteresis'"),
         (["sensitivity"], "--published NAME"),
         (["sensitivity", "--published", "in-vivo-9"], "Did you mean"),
         (["sensitivity", ELASTIC, "--result", ELASTIC], "not a result.json"),

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from tissuejax.diagnosis.catalogue import Entry, entries, linked
+from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.offered import Protocol
 from tissuejax.diagnosis.probing_runs import TOGETHER
 from tissuejax.effects.catalogue import effects
 from tissuejax.effects.effect import Effect
@@ -31,7 +33,11 @@ def test_an_offer_speaks_of_the_effect_s_own_parameters(key):
     assert len({f.name for f in offer.forms}) == len(offer.forms)
     for form in offer.forms:
         assert set(form.free) <= set(declared)
-        assert set(form.free) & set(offer.effect.amplitudes), "a form without an amplitude can't be neutral"
+        neutral = bool(set(form.free) & set(offer.effect.amplitudes))
+        assert neutral != bool(form.widens), "a form without an amplitude can't be neutral"
+        assert not (form.widens and form.free), "a form that widens the discrepancy has no parameters"
+        assert set(form.lacking) <= set(Protocol.__annotations__), "no property of a protocol"
+        assert {*form.widens, *(f for more in form.lacking.values() for f in more)} <= set(Criteria().shares)
         assert set(form.grid) <= set(form.free)
         assert {*form.each, *form.most} <= set(form.free)
         for name, values in form.grid.items():
@@ -48,6 +54,7 @@ def test_what_is_declared_begins_at_neutral_and_inside_its_range(key):
     free, start, candidates = entry.declare(model, ("r1",), ("r2",))
     assert candidates
     for c in candidates:
+        assert bool(c.amplitudes) != bool(c.widens)
         assert all(start[p] == 0 for p in c.amplitudes)
         assert set(c.paths) <= set(free)
     for path, f in free.items():
@@ -66,7 +73,7 @@ def test_what_an_effect_says_of_itself_is_what_it_does(name):
         assert set(kind.displaces) <= declared
         assert not kind.displaces or not kind.remembers
     if kind.added:
-        assert kind.stress is not Effect.stress
+        assert kind.stress is not Effect.stress or kind.channels is not Effect.channels
 
 
 def test_ranges_and_priors_follow_from_the_recordings():
@@ -88,6 +95,7 @@ def test_every_form_is_nominated_or_reached_from_one_that_is():
     offered = {c.key: c for e in found for c in e.declare(model, ("r1",), ("r2",))[2]}
     candidates = linked(found, offered)
     reached = {k for k, c in candidates.items() if c.nominated}
+    assert not any(c.beside for c in candidates.values() if c.widens), "weighed in any case, so nobody's neighbour"
     while more := {b for k in reached for b in candidates[k].beside} - reached:
         reached |= more
     assert reached == set(candidates)

@@ -60,7 +60,12 @@ def test_weight_is_told_by_its_name_alone():
 
 @pytest.mark.parametrize(
     ("said", "answer"),
-    [("frction", "friction"), ("drift", "force-drift"), ("friction.coefficient=much", "NUMBER in SI")],
+    [
+        ("frction", "friction"),
+        ("drift", "force-drift"),
+        ("friction.coefficient=much", "NUMBER in SI"),
+        ("hysteresis", "hysteresis has no parameters that could be stated"),
+    ],
 )
 def test_what_can_not_be_told_is_answered(said, answer):
     with pytest.raises(InputError, match=answer):

@@ -7,8 +7,10 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from tissuejax.diagnosis.bench import Candidate
+from tissuejax.diagnosis.catalogue import entries
 from tissuejax.diagnosis.offered import LACKING, Protocol, needs, offered, paced
 from tissuejax.effects.catalogue import effects
+from tissuejax.effects.form import Sizes
 from tissuejax.energies.catalogue import energy
 from tissuejax.experiments.catalogue import experiment
 from tissuejax.model import Model
@@ -20,7 +22,10 @@ RAMP = 1 + 0.015 * TIME
 HOLD = np.interp(TIME, [0, 5, 20], [1, 1.3, 1.3])
 CYCLE = np.interp(TIME, [0, 10, 20], [1, 1.3, 1.0])
 NAMES = ("viscoelasticity", "softening", "permanent-set", "aging", "anisotropy", "compressibility", "slack")
-CANDIDATES = {n: Candidate(n, (f"effects.{n}.x",)) for n in NAMES}
+SIZES = Sizes(energy=1.0, strain=1.0, force=1.0, session=1.0, recording=1.0)
+ALONE = Model(energy("neo-hookean"))
+WIDENING = {c.key: c for e in entries(SIZES) for c in e.declare(ALONE, ("r0",), ())[2] if c.widens}
+CANDIDATES = {n: Candidate(n, (f"effects.{n}.x",)) for n in NAMES} | WIDENING
 
 
 def sample(*stretches, kind="uniaxial", **attributes):
@@ -86,7 +91,7 @@ def test_a_drift_along_a_ramp_is_a_strain_energy():
 
 def test_what_remembers_the_way_is_a_strain_energy_until_it_comes_back():
     """Set and softening against a law of strain alone: alike on a ramp at any rate, unlike on the way back."""
-    on = [e for e in effects("homogeneous").values() if e.needs == "reversed"]
+    on = [e for e in effects("homogeneous").values() if e.needs == "reversed" and e().parameters]
     assert {e.name for e in on} >= {"permanent-set", "softening"}
     for kind in on:
         added = kind()
@@ -141,6 +146,20 @@ def test_specimens_can_differ_only_where_recordings_pass_the_same_strains():
     assert "specimen-scatter" in names(RAMP, 1 + 0.005 * TIME)  # the short one lies in the long one
     untimed = replace(sample(CYCLE, CYCLE), notes=NO_TIME)
     assert "specimen-scatter" in offered(untimed, CANDIDATES)[0]
+
+
+def test_what_only_widens_the_discrepancy_comes_last_and_the_widest_first():
+    kept, _ = offered(sample(CYCLE, CYCLE), CANDIDATES)
+    last = list(kept.values())[-3:]
+    assert [(c.key, dict(c.widens)) for c in last] == [
+        ("specimen-scatter", {"gain": 0.3}),
+        ("hysteresis", {"hysteresis": 0.15}),
+        ("energy-form/smooth in stretch", {"law": 0.15}),
+    ]
+    assert not any(c.widens for c in list(kept.values())[:-3])
+    alone, _ = offered(sample(CYCLE), CANDIDATES)  # a law of each recording's own is one that fails to carry
+    assert dict(alone["energy-form/smooth in stretch"].widens) == {"law": 0.15, "gain": 0.15}
+    assert not {c.name for c in offered(sample(CYCLE, CYCLE), CANDIDATES, ("slack",))[0].values() if c.widens}
 
 
 def test_what_was_left_out_is_said_with_its_reason():

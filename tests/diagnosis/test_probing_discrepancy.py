@@ -53,7 +53,8 @@ def left(presses, added, seed=0):
 def test_noise_leaves_no_part_of_note(presses):
     found, parts, cut = left(presses, np.zeros(len(presses[1])))
     assert max(found.values()) < 0.006
-    assert {p.family for p in parts} == {"law", "gain", "hysteresis", "onset", "slow", "marker", "white"}
+    families = {"law", "gain", "hysteresis", "onset", "slow", "marker", "marker gain", "crosstalk", "white"}
+    assert {p.family for p in parts} == families
     for part in parts:
         if part.within is not None:
             assert sum(len(b) for b in part.within) == len(cut.starts)
@@ -94,3 +95,21 @@ def test_parts_that_scale_with_a_force_hold_no_constant_share_of_it(presses):
     for part in scaling:
         if part.name != "crosstalk":
             assert np.max(np.abs(alike @ part.factor)) < 1e-9 * size * np.linalg.norm(part.factor)
+
+
+def test_a_loop_of_the_vertical_force_alone_is_hysteresis(presses):
+    """A twentieth more on the way down, less on the way back; lateral forces have their own small share of it."""
+    view, truth = presses
+    added = np.zeros(len(truth))
+    for s in view.segments:
+        if s.channel == "force":
+            down = np.where(s.time <= 5.0, 1.0, np.interp(s.time, [7.0, 7.2], [1.0, -1.0]))
+            added[s.rows] = 0.05 * down * truth[s.rows]
+    found, parts, _ = left(presses, added)
+    assert max(v for k, v in found.items() if k.startswith("hysteresis")) > 0.02
+    assert max(v for k, v in found.items() if k.endswith("of markers") or k == "marker") < 0.006
+    for part in parts:
+        if part.family == "hysteresis":
+            depth = np.concatenate([s.drive for s in view.segments])
+            cut = blocks(view, BLOCKS)
+            assert np.max(np.abs(part.factor[cut.mean(depth) == 0])) < 1e-12  # none out of contact

@@ -50,10 +50,12 @@ def test_an_effect_by_its_own_name_or_by_that_of_another():
             "effects.nonlinear-viscosity.stress": {"value": 1500.0, "unit": "Pa"},
         }},
         {"name": "specimen-scatter", "parameters": {}},
+        {"name": "energy-form", "parameters": {}},
     ]  # fmt: skip
     assert clauses(listed) == [
         "20 % of the stress flows, with 3.0 s at small load and faster from 1.5 kPa",
-        "specimen scatter",
+        "recordings differ by a stiffness or a gain of their own",
+        "the strain energy has another form",
     ]
 
 

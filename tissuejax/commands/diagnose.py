@@ -122,7 +122,7 @@ def _fit_with(found: Diagnosis, sample: Sample, given: argparse.Namespace) -> st
         if name not in effects() or any(p.rpartition(".")[0] != f"effects.{name}" for p in one["parameters"]):
             return ""
         known = {d.name: d for d in effect(typed).parameters}
-        if not values.keys() <= known.keys():
+        if not values or not values.keys() <= known.keys():
             return ""
         options += ["--effect", typed]
         for p, v in values.items():

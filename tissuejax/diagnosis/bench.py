@@ -59,6 +59,8 @@ class Candidate:
         rig: a fault of the rig, and not of the tissue.
         spectral: path of a frequency that is read from the residual's periodogram, and how many of its lines are tried.
         placed: of probings: settings of the shapes by where the probe went deepest (`effects.form.Form`).
+        heard: of probings: the channel whose periodogram `spectral` reads.
+        lacking: by property of the protocol, families that it widens too where the protocol lacks that.
     """
 
     name: str
@@ -73,6 +75,8 @@ class Candidate:
     rig: bool = False
     spectral: tuple[str, int] | None = None
     placed: Placed | None = None
+    heard: str = ""
+    lacking: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def key(self) -> str:

@@ -73,6 +73,9 @@ class Entry(Offer):
                     rig=self.effect.order == 0,
                     spectral=form.spectral and (f"{prefix}.{form.spectral[0]}", form.spectral[1]),
                     placed=form.placed,
+                    heard=form.heard,
+                    widens=dict(form.widens),
+                    lacking=dict(form.lacking),
                 )
             )
         times = [p for p in free if p.startswith(f"{prefix}.tau") and p[-1].isdigit()]
@@ -89,8 +92,13 @@ class Entry(Offer):
         return free, start, candidates
 
     def near(self, i: int, j: int) -> bool:
-        """Whether forms i and j are tried beside each other: next in the order, or one freeing all the other frees."""
+        """Whether forms i and j are tried beside each other: next in the order, or one freeing all the other frees.
+
+        A form that widens the discrepancy is weighed in any case, and is nobody's neighbour.
+        """
         one, other = self.forms[i], self.forms[j]
+        if one.widens or other.widens:
+            return False
         a, b = set(one.free), set(other.free)
         linked = one.name in other.beside or other.name in one.beside
         return i != j and (abs(i - j) == 1 or a < b or b < a or linked)

@@ -21,7 +21,6 @@ from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.kinds.recorded import Question, Recorded
 from tissuejax.diagnosis.known import known_physics, label
-from tissuejax.diagnosis.offered import HYSTERESIS, SCATTER
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.effects.catalogue import effects as all_effects
 from tissuejax.energies.catalogue import energy as named_energy
@@ -86,9 +85,8 @@ def diagnose(
     refuse_unusable(sample, (*fitted, *held_out))
     refuse_gaps(sample, (*fitted, *held_out))
     for name in effects or ():
-        offers = (*all_effects(), SCATTER.name, HYSTERESIS.name)
-        if name not in offers:
-            raise unknown("effect", name, offers)
+        if name not in all_effects():
+            raise unknown("effect", name, all_effects())
     remarks += all_slips(sample, (*fitted, *held_out))
     kind = experiment(sample.recordings[fitted[0]].experiment).kind
     stated = [*([e.name for e in energy.effects] if isinstance(energy, Model) else ()), *_items(known)]

@@ -39,6 +39,11 @@ def known_physics(given: Sequence[str], kind: str) -> Known:
                 )
         elif name not in effects(kind):
             raise unknown("effect", name, sorted(effects(kind)))
+        elif not declared_of(name):
+            raise InputError(
+                f"{item!r}: {name} has no parameters that could be stated: it is a part of what any law leaves, which "
+                "every diagnosis weighs; leave it out of what is known"
+            )
         values = found.setdefault(name, {})
         if parameter or text:
             values[parameter] = _number(item, name, parameter, text)
@@ -76,7 +81,7 @@ def tell(bench: Bench, known: Known) -> None:
         bench.start |= given
         bench.base = tuple(p for p in bench.base if p not in given)
     for name, values in effects_of(known).items():
-        forms = [c for c in bench.candidates.values() if c.name == name]
+        forms = [c for c in bench.candidates.values() if c.name == name and not c.widens]
         given = {f"effects.{name}.{p}": v for p, v in values.items()}
         declared = set(declared_of(name))
         for path, p in zip(given, values, strict=True):
@@ -89,7 +94,8 @@ def tell(bench: Bench, known: Known) -> None:
         bench.known |= given
         bench.start |= given
         bench.base = (*bench.base, *left)
-        bench.candidates = {k: c for k, c in bench.candidates.items() if c.name != name}
+        # a law of no form in the catalogue is not stated by the values of one that is
+        bench.candidates = {k: c for k, c in bench.candidates.items() if c.name != name or c.widens}
 
 
 def _form(forms: Sequence[Candidate], given: Mapping[str, float]) -> Candidate | None:

@@ -155,6 +155,7 @@ class MaterialBench(Bench):
 
     def _declare(self, energy: Energy, found: list[Entry]) -> None:
         recordings = (*self.fitted, *self.held_out)
+        every, found = found, [e for e in found if e.effect.parameters]  # the others have nothing to predict
         self._energy, self._entries = energy, found
         self._built: dict[tuple[str, ...], Program] = {}
         self._full = [e.effect for e in found if e.simple is not None]
@@ -179,7 +180,7 @@ class MaterialBench(Bench):
                 self.free[path] = Free(p.lower, p.upper, p.typical, p.unit)
                 self.start[path] = p.default
         self.base = tuple(self.free)
-        for entry in found:
+        for entry in every:
             free, start, candidates = entry.declare(whole, self.fitted, self.held_out)
             # skin and rubber are a thousand times as stiff as what the scales are declared for
             for path, f in free.items():

@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from tissuejax.diagnosis.next_experiment import Proposal, shared
 from tissuejax.diagnosis.probing import ProbingBench
+from tissuejax.diagnosis.probing_added import added
 from tissuejax.diagnosis.probing_runs import COARSE, FINE, Runs
 from tissuejax.diagnosis.probing_series import kept_samples, series
 from tissuejax.diagnosis.refit import Refit
@@ -88,7 +89,9 @@ def probing_proposals(
         return []
     segments, y, sigma = series(planned, ready)
     runs = Runs({FINE: ready, COARSE: ready}, bench.runs.effects, segments, y, kept_samples(planned, segments))
-    predicted = runs.many([(bench.at(shared(r)), names, FINE) for r in (chosen, rival)])
+    both = [bench.at(shared(r)) for r in (chosen, rival)]
+    simulated = runs.many([(at, names, FINE) for at in both])
+    predicted = [y + added(runs, at) for y, at in zip(simulated, both, strict=True)]
     keys = [", ".join(dict.fromkeys(bench.candidates[k].name for k in r.keys)) for r in (chosen, rival)]
     out = []
     for text, r in words.items():

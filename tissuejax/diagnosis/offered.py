@@ -6,7 +6,7 @@ is fitted; a clock is needed by all that acts in time (`untimed`).
 """
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,9 +16,6 @@ from tissuejax.diagnosis.untimed import without_clock, without_pace
 from tissuejax.effects.catalogue import effects
 from tissuejax.recordings.recording import Recording, Sample
 
-SCATTER = Candidate("specimen-scatter", (), widens={"gain": 0.3})
-HYSTERESIS = Candidate("hysteresis", (), widens={"hysteresis": 0.15})
-LAW = Candidate("energy-form", (), form="smooth in stretch", widens={"law": 0.15})
 BACK = 0.05  # of the range of stretch: less of a way back is no unloading
 STILL = 0.05  # of the quickest rate: slower is a hold
 RATES = 1.5  # ratio from which two rates are two
@@ -150,20 +147,13 @@ LACKING: Mapping[str, str] = {  # property of a protocol: what is said where it 
 
 def needs() -> dict[str, str]:
     """By name, the property of a protocol that an answer needs; what needs none is not in it."""
-    declared = {name: effect.needs for name, effect in effects("homogeneous").items() if effect.needs}
-    return declared | {SCATTER.name: "repeated", HYSTERESIS.name: "reversed"}
+    return {name: effect.needs for name, effect in effects("homogeneous").items() if effect.needs}
 
 
 def offered(
-    sample: Sample, candidates: Mapping[str, Candidate], names: tuple[str, ...] | None = None
+    sample: Sample, candidates: Mapping[str, Candidate], names: Sequence[str] | None = None
 ) -> tuple[dict[str, Candidate], list[str]]:
     """Candidates that the sample's recordings can show, and remarks on what was left out.
-
-    Three are added that have no parameters but let a part of the discrepancy be large: a stiffness and a law of each
-    recording's own (specimens that differ, or a gain that changed: stress and stretch can't tell), a
-    rate-independent hysteresis, and a strain energy of a form that no term of the catalogue has: what is smooth in
-    stretch, and the same for all recordings of one kind, needs no process to explain it. Where no strain was passed
-    twice, a law of each recording's own is one that fails to carry from one strain to another: that form too.
 
     Args:
         names: effects asked for; all by default.
@@ -172,20 +162,48 @@ def offered(
     if not sample.timed:
         kept = without_clock(kept)
         remarks.append("no time was recorded: effects that act in time (relaxation, drift, aging) were not tried")
-    for own in (SCATTER, HYSTERESIS, LAW):
-        if names is None or own.name in names:
-            kept[own.key] = own
-    protocol, why = Protocol.of(sample), {}
+    protocol = Protocol.of(sample)
     if not protocol.rates:
         kept = without_pace(kept)
-    if LAW.key in kept:
-        own = {} if protocol.repeated else dict.fromkeys(SCATTER.widens, LAW.widens["law"])
-        kept[LAW.key] = replace(LAW, widens={**LAW.widens, **own})
-    for name, need in sorted(needs().items()):
+    kept, left_out = shown(widened(kept, protocol, names), protocol, needs(), LACKING)
+    return kept, remarks + left_out
+
+
+def widened(
+    candidates: Mapping[str, Candidate], protocol: object, names: Sequence[str] | None = None
+) -> dict[str, Candidate]:
+    """The candidates, those that only widen the discrepancy behind the others, the widest first.
+
+    They have no linear step to be ranked by, and what may be largest sets the mark below which others are given up.
+
+    Args:
+        protocol: whose properties say what they widen too (`Form.lacking`).
+        names: effects asked for; all by default.
+    """
+    own = {k: c for k, c in candidates.items() if c.widens and (names is None or c.name in names)}
+    for key, c in own.items():
+        more = [families for need, families in c.lacking.items() if not getattr(protocol, need)]
+        own[key] = replace(c, widens={f: w for families in (c.widens, *more) for f, w in families.items()})
+    order = sorted(own, key=lambda k: (-max(own[k].widens.values()), bool(own[k].form)))
+    return {k: c for k, c in candidates.items() if not c.widens} | {k: own[k] for k in order}
+
+
+def shown(
+    candidates: Mapping[str, Candidate], protocol: object, asked: Mapping[str, str], lacking: Mapping[str, str]
+) -> tuple[dict[str, Candidate], list[str]]:
+    """Candidates that a protocol can show, and remarks on the others.
+
+    Args:
+        protocol: of the recordings, whatever their kind.
+        asked: by name of an effect, the property that it needs.
+        lacking: by property, what is said where it is not there.
+    """
+    why: dict[str, list[str]] = {}
+    kept = dict(candidates)
+    for name, need in sorted(asked.items()):
         if any(c.name == name for c in kept.values()) and not getattr(protocol, need):
             kept = {k: c for k, c in kept.items() if c.name != name}
-            why.setdefault(LACKING[need], []).append(name)
-    remarks += [
+            why.setdefault(lacking[need], []).append(name)
+    return kept, [
         f"{', '.join(left)} can't be told from these recordings and was not tried: {r}" for r, left in why.items()
     ]
-    return kept, remarks

@@ -26,6 +26,7 @@ from tissuejax.diagnosis import probing_free
 from tissuejax.diagnosis.bench import Bench, Candidate, Free
 from tissuejax.diagnosis.catalogue import Entry
 from tissuejax.diagnosis.periodogram import lines
+from tissuejax.diagnosis.probing_added import added, is_added, slope
 from tissuejax.diagnosis.probing_catalogue import probing_entries
 from tissuejax.diagnosis.probing_runs import COARSE, FINE, RETIMED, ROUGH, Runs
 from tissuejax.diagnosis.probing_series import calmed, kept_samples, series
@@ -119,7 +120,10 @@ class ProbingBench(Bench):
         tests = [setup.test for setup in self.ready.setups.values()]
         session = max(float(t.start) for t in tests) + max(float(np.max(s.time)) for s in self.segments)
         mu, height = ratio * float(guess), float(max(t.height for t in tests))
-        found = probing_entries(Probed(mu, height, session))
+        forces = [np.asarray(s.time, float) for s in self.segments if s.channel == "force"]
+        forces = forces or [np.asarray(s.time, float) for s in self.segments]
+        longest, step = max(np.ptp(t) for t in forces), max(np.median(np.diff(t)) for t in forces)
+        found = probing_entries(Probed(mu, height, session, float(longest), float(step)))
         entries = [e for e in found if names is None or e.effect.name in names]
         whole = Model(self.model.energy, None, tuple(e.effect for e in entries)).across(recordings)
         self.entries: dict[str, Entry] = {e.effect.name: e for e in entries}
@@ -144,7 +148,8 @@ class ProbingBench(Bench):
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:
         """See `Bench.predict`; NaN where a simulation broke down."""
         wanted = tuple(recordings or (*self.fitted, *self.held_out))
-        return self.runs.many([(self.at(values), wanted, FINE)])[0]
+        at = self.at(values)
+        return self.runs.many([(at, wanted, FINE)])[0] + self.mask(wanted) * added(self.runs, at)
 
     def jacobian(
         self, values: Mapping[str, float], paths: Sequence[str], recordings: Sequence[str] | None = None
@@ -173,6 +178,8 @@ class ProbingBench(Bench):
         out, left = np.zeros((len(self.y), len(asked))), []
         displaced = []
         for at, path, h, wanted in asked:
+            if is_added(self.runs, path):
+                continue
             if probing_free.moves(self, at, path):
                 displaced += probing_free.displaced(self, at, path, wanted)
             elif not probing_free.sensed(self, path):
@@ -180,7 +187,9 @@ class ProbingBench(Bench):
                 displaced += [(at, own, self.slopes), ({**at, path: at[path] + h}, own, self.slopes)]
         self.runs.many(displaced)  # all at once; what follows finds them
         for i, (at, path, h, wanted) in enumerate(asked):
-            if probing_free.moves(self, at, path):
+            if is_added(self.runs, path):
+                out[:, i] = self.mask(wanted) * slope(self.runs, at, path)
+            elif probing_free.moves(self, at, path):
                 out[:, i] = self.calmed(probing_free.moving(self, at, path, wanted))
             elif probing_free.sensed(self, path):
                 out[:, i] = probing_free.reported(self, at, path, h, self.runs.many([(at, wanted, self.slopes)])[0])
@@ -216,11 +225,12 @@ class ProbingBench(Bench):
         return {n: site(np.asarray(recordings[n].inputs["probe/position"], float)) for n in self.fitted}
 
     def settings(self, candidate: Candidate, prediction: Float[np.ndarray, " N"]) -> Sequence[Mapping[str, float]]:
-        """Frequencies from the markers' periodogram (from the force without markers); inclusions under every site."""
+        """Frequencies from the periodogram of the channel in which they are heard (by default the markers', the force's
+        without markers); inclusions under every site."""
         if candidate.spectral is not None:
             path, most = candidate.spectral
             vertical = [s for s in self.segments if s.recording in self.fitted and s.component.endswith("z")]
-            marks = [s for s in vertical if s.channel == "markers"] or vertical
+            marks = [s for s in vertical if s.channel == (candidate.heard or "markers")] or vertical
             series = [(s.time - s.time[0], (self.y - prediction)[s.rows] / self.sigma[s.rows]) for s in marks]
             return [{path: f} for f in lines(series, most)]
         if candidate.placed is not None:

@@ -51,7 +51,7 @@ class ProbingDiscrepancy:
             factor = np.zeros((len(prediction), len(self.crossed)))
             for column, (rows, time, vertical, clock) in zip(factor.T, self.crossed, strict=True):
                 column[rows] = np.interp(time, clock, prediction[vertical])
-            shaped.append(Part("crosstalk", "gain", factor))
+            shaped.append(Part("crosstalk", "crosstalk", factor))
         return (*shaped, *self.fixed)
 
 
@@ -61,11 +61,12 @@ def probing_discrepancy(view: ProbingView, cut: Blocks) -> ProbingDiscrepancy:
     Law: smooth in depth times the prediction, common to all recordings. Gain, own law: of each recording's own. Onset:
     of each recording's own too, a surface that is met too early or late, by a share of the depth (facets, softness of
     contact, how well the body is placed): of a force like depth^n, n times that over the depth. None of them holds a
-    constant share of all forces (see `ProbingDiscrepancy.about`).
-    Hysteresis (of the force) and slow wander: in units of the channel's largest value. Marker: smooth in depth times
-    what the marker moved, of each component's own, since a marker is not quite where it was registered. Crosstalk: a
-    share of the vertical force in a lateral one, as load cells of several axes have it, and meshes that are not
-    symmetric.
+    constant share of all forces (see `ProbingDiscrepancy.about`). Gains of markers are a family of their own.
+    Hysteresis: a share of the predicted force too, of each axis alike (in units of the largest force it would be as
+    large along the axes that feel nothing), with none out of contact. Slow wander: in units of the channel's largest
+    value. Marker: smooth in depth times what the marker moved, of each component's own, since a marker is not quite
+    where it was registered. Crosstalk: a share of the vertical force in a lateral one, as load cells of several axes
+    have it, and meshes that are not symmetric.
     """
     segments = view.segments
     rows = [np.flatnonzero(cut.owner == k) for k in range(len(segments))]
@@ -90,14 +91,15 @@ def probing_discrepancy(view: ProbingView, cut: Blocks) -> ProbingDiscrepancy:
         of = "" if c == "force" else f" of {c}"
         each = [inside * (recording == r)[:, None] for r in dict.fromkeys(recording.tolist())]
         shaped.append((f"law{of}", "law", wide * inside))
-        shaped.append((f"gain{of}", "gain", np.concatenate(each, axis=1).astype(float)))
-        shaped.append((f"own law{of}", "gain", np.concatenate([wide * e for e in each], axis=1)))
+        gain = "gain" if c == "force" else "marker gain"  # sites and load cells differ by nothing that cameras see
+        shaped.append((f"gain{of}", gain, np.concatenate(each, axis=1).astype(float)))
+        shaped.append((f"own law{of}", gain, np.concatenate([wide * e for e in each], axis=1)))
         if c == "force":
             onset = 1.5 * span / (np.maximum(depth, 0.0) + TOUCHING * span)  # of a ball on an elastic body, n = 3/2
             shaped.append(("onset", "onset", np.concatenate([onset[:, None] * e for e in each], axis=1)))
             shaped.append(("fine law", "law", fine * inside))
             for i, shape in enumerate(STATES):
-                fixed.append(Part(f"hysteresis, {shape}", "hysteresis", alike * inside * states[:, i, None]))
+                shaped.append((f"hysteresis, {shape}", "hysteresis", alike * inside * states[:, i, None]))
         for name, share in SLOW.items():
             if c == "force" or name == "lasting":
                 fixed.append(Part(f"{name}{of}", "slow", within=_within(rows, inside, _wander(time, share))))

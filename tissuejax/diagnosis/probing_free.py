@@ -18,6 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from tissuejax.diagnosis.probing_added import effect_values
 from tissuejax.diagnosis.probing_series import CHANNELS, filled, picked, put
 from tissuejax.effects.effect import Effect
 from tissuejax.recordings.recording import Channel
@@ -126,7 +127,7 @@ class Motion:
     def of(cls, bench: "ProbingBench", at: Mapping[str, float], path: str, recording: str) -> "Motion":
         """Of the parameter at `path` in one recording."""
         name, effect = path.split(".")[2], bench.runs.effects[path.split(".")[1]]
-        setup, own = bench.ready.setups[recording], _values(effect, at, recording)
+        setup, own = bench.ready.setups[recording], effect_values(effect, at, recording)
         probe = setup.scene.pressed
         time, place = (np.asarray(x, float) for x in (probe.time, probe.position))
 
@@ -166,12 +167,6 @@ def _axes(bench: "ProbingBench", at: Mapping[str, float], path: str, own: tuple[
     return "".join(axis for axis in "xyz" if axis in found)
 
 
-def _values(effect: Effect, at: Mapping[str, float], recording: str) -> dict[str, float]:
-    """An effect's parameters in one recording, neutral where nothing is said."""
-    paths = {d.name: f"effects.{effect.name}.{d.name}" for d in effect.parameters}
-    return {n: at.get(f"{p}.{recording}", at.get(p, effect.neutral[n])) for n, p in paths.items()}
-
-
 def reported(bench: "ProbingBench", at: Mapping[str, float], path: str, h: float, origin: np.ndarray) -> np.ndarray:
     """Derivative by a parameter of sensors, from the prediction `origin`."""
     effect, out = bench.runs.effects[path.split(".")[1]], np.zeros(len(bench.y))
@@ -196,7 +191,7 @@ def _report(bench: "ProbingBench", effect: Effect, values: Mapping[str, float], 
                 if s.recording == name and s.channel == channel:
                     put(full, s, bench.finite, origin)
             channels[channel] = Channel(np.asarray(measured[channel].time, float), full, measured[channel].unit)
-    p = _values(effect, values, name)
+    p = effect_values(effect, values, name)
     out, test = {}, bench.ready.setups[name].test
     shown = channels["markers"].values.shape[1] if "markers" in channels else 0
     test = eqx.tree_at(lambda t: t.rest, test, test.rest[:shown])  # without the padding of the simulation

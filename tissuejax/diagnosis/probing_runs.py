@@ -76,7 +76,10 @@ class Runs:
         self.finished: Finished[np.ndarray] = Finished(self.folder, depends)
 
     def many(self, asked: Sequence[Asked]) -> list[Float[np.ndarray, " N"]]:
-        """Predictions, one long vector each: as measured where a recording wasn't asked for, NaN where a run failed."""
+        """Simulations, one long vector each: as measured where a recording wasn't asked for, NaN where a run failed.
+
+        Without what sensors add to what they report (`probing_added`).
+        """
         keys = [[self._key(values, r, kind) for r in recordings] for values, recordings, kind in asked]
         new = self.finished.unknown(k for row in keys for k in row)
         self.cost += sum(self._price(kind) for _, kind, _ in new)
@@ -121,7 +124,10 @@ class Runs:
         return self._predictor(kind, counted, finer).job(dict(counted), recording)
 
     def _key(self, values: Mapping[str, float], recording: str, kind: str) -> tuple:
-        """Recording, simulation, and the values that count there: those of effects that are on, sorted."""
+        """Recording, simulation, and the values that count there: those of effects that are on, sorted.
+
+        What sensors add to what they report is no business of a simulation (`probing_added`).
+        """
         others = [n for n in self.rows if n != recording]
         own = {p: float(v) for p, v in values.items() if p.rsplit(".", 1)[-1] not in others}
         on = {
@@ -129,6 +135,7 @@ class Runs:
             for p, v in own.items()
             if v != 0 and p.startswith("effects.") and p.split(".")[2] in self.effects[p.split(".")[1]].amplitudes
         }
+        on = {n for n in on if not type(self.effects[n]).added}
         counted = {p: v for p, v in own.items() if not p.startswith("effects.") or p.split(".")[1] in on}
         return recording, kind, tuple(sorted(counted.items()))
 

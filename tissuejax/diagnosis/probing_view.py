@@ -34,6 +34,7 @@ from scipy.ndimage import gaussian_filter1d
 from tissuejax.diagnosis.bench import Bench, Candidate
 from tissuejax.diagnosis.judgement.blocks import Blocks, blocks
 from tissuejax.diagnosis.probing import ProbingBench
+from tissuejax.diagnosis.probing_added import added, is_added
 from tissuejax.diagnosis.probing_runs import COARSE, FINE, RETIMED
 from tissuejax.diagnosis.probing_slopes import Slope
 from tissuejax.experiments.probing_sensors import FEWEST
@@ -181,10 +182,12 @@ class ProbingView(Bench):
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:
         """See `Bench.predict`; NaN where a simulation broke down."""
         wanted = tuple(recordings or (*self.fitted, *self.held_out))
-        coarse_run = self.source.runs.many([(self.source.at(values), wanted, COARSE)])[0]
+        at = self.source.at(values)
+        coarse_run = self.source.runs.many([(at, wanted, COARSE)])[0]
         if self.place is not None:
             coarse_run = self.place + self.source.calmed(coarse_run - self.place)
-        return (coarse_run + self.shift - self.origin) / self.unit
+        heard = self.mask(wanted) * added(self.source.runs, at)
+        return (coarse_run + heard + self.shift - self.origin) / self.unit
 
     def rooted(self, values: Mapping[str, float]) -> "ProbingView":
         """See `Bench.rooted`."""
@@ -204,12 +207,13 @@ class ProbingView(Bench):
         """See `Bench.jacobian`; columns taken nearby are taken again."""
         wanted = tuple(recordings or (*self.fitted, *self.held_out))
         at = {**{p: self.source.start[p] for p in paths}, **self.source.at(values)}
-        columns = {p: self._nearby(p, at, wanted, self.reach) for p in paths}
+        free = {p for p in paths if is_added(self.source.runs, p)}  # exact, and as cheap as a look
+        columns = {p: None if p in free else self._nearby(p, at, wanted, self.reach) for p in paths}
         missing = [p for p, c in columns.items() if c is None]
         if missing:
             made = self.source.jacobian(values, missing, wanted)
             for p, column in zip(missing, made.T, strict=True):
-                columns[p] = self._kept(p, at, wanted, column)
+                columns[p] = column if p in free else self._kept(p, at, wanted, column)
         return np.stack([columns[p] for p in paths], axis=1) / self.unit[:, None]
 
     def columns(
@@ -219,12 +223,16 @@ class ProbingView(Bench):
         base = self.source.at(values) if self.root is None else self.root
         asked = [({**base, p: self.source.start[p], **s}, p) for s, p in settings]
         asked = [({**at, p: base.get(p, self.source.start[p])}, p) for at, p in asked]
-        columns = [self._nearby(p, at, self.fitted, self.reach) for at, p in asked]
+        free = [is_added(self.source.runs, p) for _, p in asked]
+        columns = [
+            None if alone else self._nearby(p, at, self.fitted, self.reach)
+            for (at, p), alone in zip(asked, free, strict=True)
+        ]
         missing = [i for i, c in enumerate(columns) if c is None]
         if missing:
             made = self.source.columns(base, [settings[i] for i in missing])
             for i, column in zip(missing, made.T, strict=True):
-                columns[i] = self._kept(asked[i][1], asked[i][0], self.fitted, column)
+                columns[i] = column if free[i] else self._kept(asked[i][1], asked[i][0], self.fitted, column)
         return np.stack(columns, axis=1) / self.unit[:, None]
 
     def _nearby(self, path, at, wanted, reach) -> Float[np.ndarray, " N"] | None:

@@ -38,6 +38,8 @@ class Effect(eqx.Module):
         shares: of these, parts of one whole, which together stay below it.
         needs: what a protocol of material tests must do to show it, a property of `diagnosis.offered.Protocol`; "" if
             nothing in particular. Where it is lacking the effect is another strain energy by its deeds, or nothing.
+        asks: the same of probings, a property of `diagnosis.probing_offered.Pressed`.
+        remedy: what to do where it is named and has no parameters to fit, one sentence.
         timed: parameters that act in time, so that they mean nothing where no times were recorded.
         slow: of these, the ones that are another strain energy by their deeds where all is loaded at one rate and never
             held: there the time is a function of the strain.
@@ -55,8 +57,8 @@ class Effect(eqx.Module):
         searches: of material tests: whether it turns every prediction into a search.
         price: how many times longer a prediction of a material test takes with that search.
         history: of material tests: whether its stress has a past, which a compiled program holds or not.
-        added: of material tests: whether it is added to the reported stress last, so that its derivative needs nothing
-            else.
+        added: whether it is added to what is reported last, a function of time alone, so that its derivative needs
+            nothing else, and in a probing no simulation.
         group: of probings: effects of one group are compiled together ("rig": in every program; "" alone).
         displaces: of probings: parameters that only move the probe towards the tissue (`diagnosis.probing_free`).
         sensed: of probings: parameters that only change what sensors report, of an effect that changes more.
@@ -79,6 +81,8 @@ class Effect(eqx.Module):
     amplitudes: ClassVar[tuple[str, ...]]
     shares: ClassVar[tuple[str, ...]] = ()
     needs: ClassVar[str] = ""
+    asks: ClassVar[str] = ""
+    remedy: ClassVar[str] = ""
     timed: ClassVar[tuple[str, ...]] = ()
     slow: ClassVar[tuple[str, ...]] = ()
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {}

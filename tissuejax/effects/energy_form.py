@@ -13,6 +13,7 @@ from tissuejax.energies.strain import Strain
 from tissuejax.parameters import Parameter
 
 TERMS = ("C20", "C30", "C01", "C02", "exponential", "ogden")
+WIDTH = 0.15  # of the stress: ten times what any law leaves (`Criteria.shares`, `strange`)
 
 
 class EnergyForm(Effect):
@@ -20,6 +21,11 @@ class EnergyForm(Effect):
 
     x = I1bar - 3, y = I2bar - 3, b is `exponent`, a is `power`; only `terms` are there. A term that the base has too
     can't be told from it: leave it out of `terms`.
+
+    A diagnosis of material tests tries one form more, without parameters: whatever is smooth in stretch and the same
+    for all recordings of one kind is a strain energy, be it of a form that no term here has, and needs no process to
+    explain it. Where no strain was passed twice, a law of each recording's own is one that fails to carry from one
+    strain to another: that form too.
 
     Revealed by misfit that is a function of stretch alone, the same on loading and unloading and at all rates. Blind:
     small strains (all isotropic energies agree there); I1 and I2 terms differ only between kinds of test. Source:
@@ -58,6 +64,7 @@ class EnergyForm(Effect):
             Form("cubic and second invariant", ("C30", "C01"), nominated=False),
             Form("all", ("C30", "C01", "C02", "exponential", "exponent"), nominated=False, most=steepest),
             Form("stretch power", ("ogden", "power"), nominated=False, beside=alone, **power),
+            Form("smooth in stretch", (), widens={"law": WIDTH}, lacking={"repeated": {"gain": WIDTH}}),
         )
         terms = ("C30", "C01", "C02", "exponential")
         return Offer(

@@ -25,6 +25,7 @@ class ForceDrift(Effect):
     name: ClassVar[str] = "force-drift"
     kinds: ClassVar[frozenset[str]] = frozenset({"probing"})
     group: ClassVar[str] = "rig"
+    added: ClassVar[bool] = True
     reveals: ClassVar[str] = "force out of contact, growing in time"
     blind: ClassVar[str] = "probings that begin in contact; a wrong gain is never seen"
     words: ClassVar[tuple[str, ...]] = (

@@ -36,6 +36,10 @@ class Form:
             probing's markers where it has any.
         placed: of probings: shapes that are scanned by where the probe went deepest: of these places by recording, m,
             and the tissue's height there, m, settings of the shapes.
+        heard: of probings: the channel whose periodogram `spectral` reads; "" for markers where it has any.
+        widens: families of the discrepancy that are far larger where this acts, with the standard deviation of their
+            prior, a share of what is measured; a form that widens has no parameters.
+        lacking: by property of the protocol, what it widens too where the protocol lacks that.
     """
 
     name: str
@@ -48,6 +52,9 @@ class Form:
     beside: tuple[str, ...] = ()
     spectral: tuple[str, int] | None = None
     placed: Placed | None = None
+    heard: str = ""
+    widens: Mapping[str, float] = field(default_factory=dict)
+    lacking: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -97,11 +104,15 @@ class Probed:
         modulus: shear modulus of the tissue, as its force says, Pa.
         height: of the tissue, m.
         session: from the first recording to the end of the last, s.
+        recording: duration of the longest, s.
+        step: between samples of the force, the longest, s.
     """
 
     modulus: float
     height: float
     session: float
+    recording: float = 10.0
+    step: float = 0.05
 
     @property
     def energy(self) -> float:

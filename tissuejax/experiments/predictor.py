@@ -77,7 +77,8 @@ def predictor(model: Model, sample: Sample, names: Sequence[str] | None = None, 
         options: passed to the predictor (mesh and time step of a probing).
 
     Raises:
-        InputError: an unknown recording, none at all, recordings of different kinds, or an effect of another kind.
+        InputError: an unknown recording, none at all, recordings of different kinds, an effect of another kind, or one
+            without parameters.
     """
     names = tuple(sample.recordings if names is None else names)
     for name in names:
@@ -93,5 +94,10 @@ def predictor(model: Model, sample: Sample, names: Sequence[str] | None = None, 
             known = ", ".join(sorted(effects(kind)))
             raise InputError(
                 f"effect {effect.name} does nothing in {WORDS.get(kind, kind)}; what can act there: {known}"
+            )
+        if not effect.parameters:
+            raise InputError(
+                f"effect {effect.name} has no parameters: there is nothing to predict or to fit. It is a part of what "
+                f"any law leaves, which `tissuejax diagnose` weighs. {effect.remedy}"
             )
     return lookup("kind of experiment", kind, members(package, Predictor)).prepare(model, sample, names, **options)

@@ -139,15 +139,20 @@ def simulated(model: Model, values: Mapping[str, Array], setup: Setup) -> Simula
     placed = setup.scene.markers
     if out.markers is not None and placed is not None and len(setup.marker_times):
         channels = {**channels, "markers": Channel(out.end_time, _about_rest(out.markers, placed.rest, setup), "m")}
-    for effect in reversed(model.ordered):
+    outwards = tuple(reversed(model.ordered))
+    for effect in (e for e in outwards if not type(e).added):
         channels = effect.channels(under(f"effects.{effect.name}", values), setup.test, channels)
     times = {"force": setup.force_times, "markers": setup.marker_times}
     pierced = out.pierced(scene)
     bad = (out.failed >= 0) | (pierced >= 0)
     poison = jnp.where(bad, jnp.nan, 0.0)  # a broken run must never look like a prediction
     read = {name: read_at(times[name], ch.time, ch.values) + poison for name, ch in channels.items()}
+    shown: Mapping[str, Channel] = {name: Channel(times[name], read[name], channels[name].unit) for name in read}
+    for effect in (e for e in outwards if type(e).added):  # of time alone: at the sensors' own, not between frames
+        shown = effect.channels(under(f"effects.{effect.name}", values), setup.test, shown)
+    reported = {name: jnp.asarray(ch.values) for name, ch in shown.items()}
     return Simulated(
-        read, out.failed, out.element, out.inertia, out.depth, ballast, out.state.u.T, pierced, out.hourglass,
+        reported, out.failed, out.element, out.inertia, out.depth, ballast, out.state.u.T, pierced, out.hourglass,
         out.corner,
     )  # fmt: skip
 

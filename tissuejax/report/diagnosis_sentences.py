@@ -46,7 +46,8 @@ def meanings(d: Diagnosis) -> list[str]:
         e = known.get(name)
         if e is not None:
             text = (inspect.getdoc(e) or "").split("\n\n")[0].replace("\n", " ")
-            out.append(f"{name}: {text} It is seen by {e.reveals}; blind to it: {e.blind}.")
+            what = f" What to do: {e.remedy}." if e.remedy else ""
+            out.append(f"{name}: {text} It is seen by {e.reveals}; blind to it: {e.blind}.{what}")
     return out
 
 

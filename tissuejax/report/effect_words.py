@@ -80,7 +80,8 @@ def clauses(listed: Sequence[dict]) -> list[str]:
             effect, parameter = path.removeprefix("effects.").split(".")[:2]
             by_effect.setdefault(effect, {}).setdefault(parameter, []).append(p)
         parts = [
-            said(effect, {n: _found(of) for n, of in parameters.items()}) for effect, parameters in by_effect.items()
+            said(effect, {n: _found(of) for n, of in parameters.items()})
+            for effect, parameters in (by_effect or {entry["name"]: {}}).items()
         ]
         out.append(", ".join(part for part in parts if part) or entry["name"].replace("-", " "))
     return list(dict.fromkeys(out))

@@ -67,6 +67,7 @@ class Criteria:
     shares: Mapping[str, float] = field(
         default_factory=lambda: (
             {"law": 0.015, "gain": 0.015, "hysteresis": 0.01, "added law": 0.01, "slow": 0.01, "white": 0.005}
+            | {"marker gain": 0.015, "crosstalk": 0.015}
             | {"effect": 0.1, "marker": 0.02, "onset": 0.01, "peak": 0.05, "numerical": 1.0, "sudden": 1e-4}
         )
     )

@@ -249,7 +249,8 @@ class Exploration:
                 if s.gain < (0.0 if key and self.bench.costly else self.effort.least):
                     break
                 seen.setdefault(self.bench.candidates[s.key].name, []).append(s)
-            lists.append([(key, rows[0]) for rows in itertools.islice(seen.values(), each)])
+            more = len(free) if self.bench.costly else 0
+            lists.append([(key, rows[0]) for rows in itertools.islice(seen.values(), each + more)])
         tried = {self.company(k) for k in self.weighed}
         for row in itertools.zip_longest(*lists):
             for key, score in filter(None, row):
@@ -259,7 +260,9 @@ class Exploration:
                 if self.bench.costly and self._behind(key, score):
                     continue
                 tried.add(company)
-                if self._grown(key, score) is not None:
+                # what only widens the discrepancy has no slopes that cost simulations
+                cheap = self.bench.costly and self.bench.candidates[score.key].widens
+                if self._grown(key, score) is not None and not cheap:
                     most -= 1
 
     def _behind(self, key: frozenset, score: Score) -> bool:

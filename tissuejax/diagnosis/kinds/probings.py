@@ -14,6 +14,7 @@ from tissuejax.diagnosis.next_probing import probing_proposals
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_discrepancy import probing_discrepancy
 from tissuejax.diagnosis.probing_map import stiffness_maps
+from tissuejax.diagnosis.probing_offered import pressed
 from tissuejax.diagnosis.probing_view import ProbingView, probing_blocks
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.estimation.discrepancy import Discrepancy
@@ -48,9 +49,11 @@ class Probings(Recorded):
         q = question
         own = ProbingBench.of(q.sample, q.energy, q.every, (), q.tried, q.keep)
         narrow = own.narrowed(q.fitted, q.held_out, q.tried)
+        left_out: list[str] = []
         for bench in (own, narrow):
             tell(bench, q.known)
-        return cls(question, ProbingView.of(narrow), ProbingView.of(own), PROBING)
+            bench.candidates, left_out = pressed(own.segments, bench.candidates, q.effects)
+        return cls(question, ProbingView.of(narrow), ProbingView.of(own), PROBING, left_out)
 
     def left(self) -> tuple[Blocks, Discrepancy]:
         """See `Recorded.left`."""

@@ -1,0 +1,65 @@
+"""Which candidates these probings can speak of: none that asks for what was not done (`Effect.asks`)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tissuejax.diagnosis.bench import Candidate
+from tissuejax.diagnosis.offered import motion, shown, widened
+from tissuejax.effects.catalogue import effects
+from tissuejax.estimation.series import Segment
+
+ENOUGH = 20  # of the force: four in each of five periods, so that a hum has a range of frequencies to lie in
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """What was done in the probings of a sample.
+
+    Attributes:
+        several: the force of several recordings was measured, pressed into the tissue each; all pass the depths of the
+            shallowest, so a gain of each one's own is no law that fails to carry from one depth to another.
+        reversed: some force was measured while the probe went back; before that, whatever remembers the way is a
+            function of the depth.
+        sampled: the longest series of the force has enough samples to hold some periods of a hum.
+    """
+
+    several: bool
+    reversed: bool
+    sampled: bool
+
+    @classmethod
+    def of(cls, segments: Sequence[Segment]) -> "Pressed":
+        """Of the series of a bench, whose drive is the depth."""
+        forces = [s for s in segments if s.channel == "force"]
+        deep = [s for s in forces if float(np.ptp(s.drive)) > 0]
+        return cls(
+            several=len({s.recording for s in deep}) > 1,
+            reversed=any(motion(np.asarray(s.time), np.asarray(s.drive))[0] for s in deep),
+            sampled=max((len(s.time) for s in forces), default=0) >= ENOUGH,
+        )
+
+
+WITHOUT: Mapping[str, str] = {  # property of the probings: what is said where it is not there
+    "several": "there is one force only, whose gain is that of the moduli",
+    "reversed": "no force was measured while the probe went back",
+    "sampled": "the force has too few samples to hold some periods",
+}
+
+
+def asked() -> dict[str, str]:
+    """By name, the property that an answer asks for; what asks for none is not in it."""
+    return {name: effect.asks for name, effect in effects("probing").items() if effect.asks}
+
+
+def pressed(
+    segments: Sequence[Segment], candidates: Mapping[str, Candidate], names: Sequence[str] | None = None
+) -> tuple[dict[str, Candidate], list[str]]:
+    """Candidates that probings can show, and remarks on what was left out.
+
+    Args:
+        names: effects asked for; all by default.
+    """
+    protocol = Pressed.of(segments)
+    return shown(widened(candidates, protocol, names), protocol, asked(), WITHOUT)
