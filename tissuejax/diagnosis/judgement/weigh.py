@@ -18,6 +18,7 @@ from scipy.stats import kurtosis
 
 from tissuejax.diagnosis.bench import Bench, Candidate
 from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.effort import Course
 from tissuejax.diagnosis.judgement.evidence import SetEvidence
 from tissuejax.diagnosis.judgement.marginal import (
     Linear,
@@ -33,9 +34,6 @@ from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.refit import Descent, Refit, Resting, refit
 from tissuejax.estimation.discrepancy import Part
 
-ROUNDS = 4  # of fit and amplitudes in turn
-SHORTENED = 5  # halvings of a step to where the fine simulation fails
-SETTLED = 0.1  # nats: a round that gains less is the last
 FELT = 1e-6  # of the peak: what is no rounding, by its slope
 WILD = 1e3  # of the peak: a prediction beyond that has no density, were it of one sample alone
 NOTHING = 1e-12  # of the peak: a change of the stress that is rounding
@@ -100,46 +98,50 @@ def beside(slope: float, curvature: float) -> float:
     return 0.5 * math.log(math.pi / (2 * h)) + math.log(erfcx(max(slope, 0.0) / math.sqrt(2 * h)))
 
 
+@dataclass(frozen=True)
+class Start:
+    """Where the weighing of a set begins.
+
+    Attributes:
+        values: parameters, by which the priors of the amplitudes go too.
+        v: squared amplitudes of the discrepancy; of their prior's size by default.
+        bench: where a cheap simulation is corrected, with the correction to begin with; that of the base by default.
+        at: where the fit begins, if not at `values`.
+    """
+
+    values: Mapping[str, float]
+    v: Float[np.ndarray, " K"] | None = None
+    bench: Bench | None = None
+    at: Mapping[str, float] | None = None
+
+
 def weigh(
-    scales: Scales,
-    keys: Sequence[str],
-    start: Mapping[str, float],
-    criteria: Criteria,
-    v: Float[np.ndarray, " K"] | None = None,
-    rounds: int = ROUNDS,
-    iterations: int = 12,
-    floor: float = -math.inf,
-    bench: Bench | None = None,
-    anchor: bool = True,
-    at: Mapping[str, float] | None = None,
+    scales: Scales, keys: Sequence[str], start: Start, criteria: Criteria, course: Course | None = None
 ) -> Weighed:
     """Fit the set `keys` from `start` and weigh it.
 
     Args:
-        bench: where a cheap simulation is corrected, with the correction to begin with; that of the base by default.
-        anchor: whether the correction is taken anew where the fit comes to rest.
-        v: squared amplitudes to begin with; of their prior's size by default.
-        at: where the fit begins, if not at `start`, by which the priors of the amplitudes go.
-        floor: log evidence below which the set is hopeless and not followed further.
+        course: how far the fit is followed; that of a search's base by default.
     """
+    course = course or Course()
     names = scales.bench.fitted
     widths = scales.priors(criteria, keys)
-    anew, v = v is None, widths.width**2 if v is None else v
-    bench, priors = with_priors(scales, keys, start, criteria, bench)
+    anew, v = start.v is None, widths.width**2 if start.v is None else start.v
+    bench, priors = with_priors(scales, keys, start.values, criteria, start.bench)
     y, best = scales.cut.mean(bench.y), None
-    at, tolerance, raw = dict(at or start), 0.5, None
-    bench = bench.anchored(at) if anchor else bench.nearer(at)
+    at, tolerance, raw = dict(start.at or start.values), course.first, None
+    bench = bench.anchored(at) if course.anchor else bench.nearer(at)
     parts = scales.about(bench.predict(at), bench, keys, at)
     # what laws of effects err by lies across the slopes at a fit, and before the first there are none
     exact = np.where([f == "effect" for f in scales.families], 0.0, v)
-    for turn in range(rounds):
+    for turn in range(course.rounds):
         misfit = Whitening(bench, scales.cut, scales.blocked, parts, v if turn else exact)
         seed = None if raw is None or bench.costly else misfit.whiten_means(raw)
-        fit = refit(bench, misfit, keys, at, iterations=iterations, tolerance=tolerance, errors=False, seed=seed)
+        fit = refit(bench, misfit, keys, at, iterations=course.iterations, tolerance=tolerance, errors=False, seed=seed)
         if not np.isfinite(fit.chi2):
             break
-        if anchor:
-            bench, fit = _anchored(bench, fit, at)
+        if course.anchor:
+            bench, fit = _anchored(bench, fit, at, course.shortened)
         if not np.max(np.abs(fit.prediction)) < WILD * scales.peak:
             break  # shares of it would cover all that was measured
         descent = Descent(bench, misfit, tuple(fit.values), names, {})
@@ -162,7 +164,7 @@ def weigh(
         dead = np.max(np.abs(jac), axis=0, initial=0.0) * descent.scale <= NOTHING * scales.peak
         free = ~bound & ~(dead & (weak == 0))
         linear = Linear(residual, jac[:, free], offset[free], weak[free])
-        v, m = _amplitudes(linear, parts, widths, scales.blocked, v, anew, bench.costly)
+        v, m = _amplitudes(linear, parts, widths, scales.blocked, v, anew, bench.costly, course.settled)
         anew = False
         value = m.value + 0.5 * int(np.sum(free)) * math.log(2 * math.pi)
         # of these parameters, and not of those that a straight line leads to: the parts move with the prediction
@@ -185,21 +187,21 @@ def weigh(
             )
         else:
             break
-        if gained < SETTLED or total + ahead < floor:
+        if gained < course.settled or total + ahead < course.floor:
             break
-        at, tolerance = dict(fit.values), tolerance if bench.costly else 0.1
+        at, tolerance = dict(fit.values), tolerance if bench.costly else course.later
     if best is None:
         return _impossible(scales, keys)
-    return replace(_described(scales, keys, best, criteria), settled=anchor)
+    return replace(_described(scales, keys, best, criteria), settled=course.anchor)
 
 
-def _anchored(bench: Bench, fit: Refit, start: Mapping[str, float]) -> tuple[Bench, Refit]:
+def _anchored(bench: Bench, fit: Refit, start: Mapping[str, float], shortened: int) -> tuple[Bench, Refit]:
     """The bench corrected where a fit came to rest, and the fit; nearer to its start where the fine simulation fails.
 
     A law that softens may be stable on a coarse mesh, where strains are averaged, and not on a fine one.
     """
     first = fit
-    for _ in range(SHORTENED):
+    for _ in range(shortened):
         near = bench.anchored(fit.values)
         if near is not bench or fit is not first:
             fit = replace(fit, prediction=near.predict(fit.values))
@@ -209,14 +211,16 @@ def _anchored(bench: Bench, fit: Refit, start: Mapping[str, float]) -> tuple[Ben
     return bench, fit  # its prediction is not finite, and ends the search
 
 
-def _amplitudes(linear, parts, widths: Widths, blocked, v, anew: bool, both: bool) -> tuple[np.ndarray, Marginal]:
+def _amplitudes(
+    linear, parts, widths: Widths, blocked, v, anew: bool, both: bool, settled: float
+) -> tuple[np.ndarray, Marginal]:
     """`amplitudes` from `v`; anew also from where all is wide that may be: alone, or beside that from `v`.
 
     A part that is empty, as that of effects is where none acts, stays at nothing.
     """
     v, tried = np.where([p.factor is None or np.any(p.factor) for p in parts], v, 0.0), []
     if anew:
-        wide = amplitudes(linear, parts, widths.widest, blocked, v, tolerance=SETTLED)[0]
+        wide = amplitudes(linear, parts, widths.widest, blocked, v, tolerance=settled)[0]
         tried.append(amplitudes(linear, parts, widths, blocked, wide))
     if both or not anew:
         tried.append(amplitudes(linear, parts, widths, blocked, v))
@@ -303,7 +307,7 @@ def _described(scales: Scales, keys: Sequence[str], best: Round, criteria: Crite
         n=n,
         kurtosis=float(kurtosis(whitened)),
         explained=float(np.clip(1 - max(chi2 - n, 0.0) / base, -1.0, 1.0)),
-        rest=(float(np.mean(left**2 + open_still)) + spiky, wobble(left, open_still, 1.0)),
+        rest=(float(np.mean(left**2 + open_still)) + spiky, wobble(left, open_still, criteria.alike)),
         numerical=numerical(scales, parts, v),
     )
     size = scales.peak if scales.size is None else scales.size
