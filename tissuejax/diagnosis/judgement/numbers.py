@@ -48,7 +48,20 @@ class Numbers:
             value = min(value, 0.99)
         elif isinstance(known[path], int):
             value = max(round(value), 1)
-        return _with(self, path.split("."), value)
+        return self.having(path, value)
+
+    def having(self, path: str, value: float) -> "Numbers":
+        """The same with this number at `path`.
+
+        Raises:
+            InputError: no such number, or part of one where it counts something.
+        """
+        known = self.all()
+        if path not in known:
+            raise unknown("number", path, known)
+        if isinstance(known[path], int) and value != round(value):
+            raise InputError(f"{path} = {value:g}: it counts something; give a whole number")
+        return _with(self, path.split("."), round(value) if isinstance(known[path], int) else value)
 
 
 def numbers_of(record: object) -> dict[str, float]:
