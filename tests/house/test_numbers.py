@@ -22,7 +22,7 @@ ROOMS = [
     *(ROOT / "diagnosis" / f"{name}.py" for name in ("probing_discrepancy", "cutting_discrepancy")),
     *(ROOT / "estimation" / f"{name}.py" for name in ("discrepancy", "sudden", "smoothness")),
 ]
-# Numbers of formulas: counts of two or less, halves.
+# Numbers of formulas inside functions: counts of two or less, halves. Of constants and defaults none is left out but 0.
 FORMULA = (0, 1, 2, 0.5)
 # What rounds, and where an iteration or a quadrature inside a formula ends: by file, the name it has or the function it
 # stands in, its value, and why.
@@ -40,7 +40,8 @@ ROUNDING = {
     "judgement/mass.py": {
         "LEAST TEN POINTS 0.0001": "of the quadrature", "LEAST TEN POINTS 10": "of it", "LEAST TEN POINTS 500": "of it",
         **{f"KNOTS {x:g}": "of an interpolation" for x in (0.03, 0.1, 0.3, 3.0, 10.0, 100.0)},
-        **{f"AROUND {x}": "of an interpolation" for x in (4, 8, 16)},
+        "KNOTS 1": "of an interpolation",
+        **{f"AROUND {x:g}": "of an interpolation" for x in (0.5, 1, 2, 4, 8, 16)},
         "FALLEN 15": "nats: what lies beyond is nothing", "MOVED 0.001": "above rounding",
         "amplitude_mass 0.001": "on the diagonal of a matrix", "_within 0.02": "least error between knots",
         "_within 1.5": "its largest",
@@ -68,21 +69,26 @@ def loose(tree: ast.AST) -> list[str]:
     """
     records, found = {r.__name__ for r in RECORDS}, []
 
-    def walk(node: ast.AST, where: str, within: bool) -> None:
+    def walk(node: ast.AST, where: str, formula: tuple[float, ...]) -> None:
         if isinstance(node, ast.ClassDef) and node.name in records:
             return
         if isinstance(node, ast.FunctionDef):
-            where, within = node.name, True
-        elif isinstance(node, ast.Assign | ast.AnnAssign) and not within:
+            where = node.name
+            for default in (*node.args.defaults, *filter(None, node.args.kw_defaults)):
+                walk(default, where, (0,))
+            for statement in (*node.decorator_list, *node.body):
+                walk(statement, where, FORMULA)
+            return
+        if isinstance(node, ast.Assign | ast.AnnAssign) and formula != FORMULA:
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
             where = " ".join(n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name))
-        elif isinstance(node, ast.Constant) and type(node.value) in (int, float):
-            rounds = node.value in FORMULA or 0 < node.value <= 1e-6
+        if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+            rounds = node.value in formula or 0 < node.value <= 1e-6
             found.extend([] if rounds else [f"{where} {node.value:g}"])
         for child in ast.iter_child_nodes(node):
-            walk(child, where, within)
+            walk(child, where, formula)
 
-    walk(tree, "", False)
+    walk(tree, "", (0,))
     return found
 
 
@@ -102,10 +108,11 @@ class Effort:
     most: int = 3
 class Other:
     most: int = 4
-def f(x, far=20):
+def f(x, far=20, *, half=0.5):
     return 0.5 * x > 7 + 1e-9
+TWICE = 2
 """
-    assert sorted(loose(ast.parse(source))) == ["NEAR 8", "f 20", "f 7", "most 4"]
+    assert sorted(loose(ast.parse(source))) == ["NEAR 8", "TWICE 2", "f 0.5", "f 20", "f 7", "most 4"]
 
 
 @pytest.mark.parametrize("record", RECORDS)

@@ -25,8 +25,8 @@ def inside(
     return out
 
 
-def distinct(score: Score, most: int, short: int = 0) -> list[tuple[float, dict, dict]]:
-    """The best settings whose gains are worth a start of their own; all of a list no longer than `short`.
+def distinct(score: Score, most: int, worthwhile: float, short: int) -> list[tuple[float, dict, dict]]:
+    """The best settings whose gains are `worthwhile` beside the best one's; all of a list no longer than `short`.
 
     A linear step ranks directions of strong fibres badly: those that it sees first shorten and go slack.
     """
@@ -34,7 +34,7 @@ def distinct(score: Score, most: int, short: int = 0) -> list[tuple[float, dict,
         return list(score.settings)
     kept = list(score.settings[:1])
     for trial in score.settings[1:]:
-        if len(kept) >= most or trial[0] < 0.5 * kept[0][0]:
+        if len(kept) >= most or trial[0] < worthwhile * kept[0][0]:
             break
         kept.append(trial)
     return kept

@@ -39,6 +39,8 @@ class Criteria:
             the numerical error, in units of what mesh and speed leave open by Richardson's extrapolation.
         strange: by which factor such a part is wider. Ground: 10 makes of 1 to 2 % the 10 to
             20 % by which effects of the catalogue change a recording.
+        partly: chance that a part which one form of an effect widens is wide beside another form of it. Ground: as
+            likely as not.
         settled: families that are never wider: what they are is known, or (an added law) nothing but what another part
             is already: a law beside the base is a share of the stress.
         sudden: standard deviation of the half-normal prior of what happens at once, where something does: share of the
@@ -81,6 +83,7 @@ class Criteria:
         )
     )
     strange: float = 10.0
+    partly: float = 0.5
     settled: frozenset[str] = frozenset({"peak", "effect", "added law"})
     sudden: float = 0.1
     change: float = 0.3

@@ -40,6 +40,8 @@ class Effort:
         spare: nominees of a parent beyond its share of these sets. Ground: cost; some are tried by another already.
         reshaped: sets that are tried in all their forms, by size. Ground: cost.
         starts: settings of the shapes that a set is begun from. Ground: cost; the linear step ranks the others lower.
+        worthwhile: gain of a setting's linear step from where on it is begun from too, share of the best one's. Ground:
+            fits gain less than half as much more or less than their steps promise.
         short: settings of a shape that are all tried where nothing is named yet, if they are no more. Ground: a linear
             step ranks directions of strong fibres badly.
         spend: cost of all predictions (of the plain base model each) after which nothing new is begun.
@@ -70,6 +72,7 @@ class Effort:
     spare: int = 2
     reshaped: tuple[int, ...] = (2, 1, 0)
     starts: int = 2
+    worthwhile: float = 0.5
     short: int = 4
     spend: float = 4e4
     nested: int = 2

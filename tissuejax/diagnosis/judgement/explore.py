@@ -248,7 +248,7 @@ class Exploration:
         short = self.effort.short if not key and self.effort.starts > 1 else 0
         starts = [
             {**parent.refit.values, **setting, **inside(self.bench, candidate, step, setting, parent.refit.values)}
-            for _, step, setting in distinct(score, self.effort.starts, short)
+            for _, step, setting in distinct(score, self.effort.starts, self.effort.worthwhile, short)
         ]
         alone = self._alone(key, score.key)
         # beside a discrepancy that has taken up the misfit a step from nothing is short: a gap, say, is far from where

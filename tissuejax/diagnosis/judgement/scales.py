@@ -125,7 +125,7 @@ class Scales:
         width = np.array([wide.get(f, criteria.shares[f]) for f in self.families])
         sudden = np.array([f == "sudden" for f in self.families])
         several = max(int(np.sum(free & ~sudden)), 1)
-        chance = free * criteria.unknown / several + 0.5 * partly
+        chance = free * criteria.unknown / several + criteria.partly * partly
         if not sudden.any():
             return Widths(width, chance, criteria.strange)
         chance = np.where(sudden, criteria.unknown / max(self.moments, 1), chance)

@@ -163,8 +163,11 @@ def weigh(
         # what nothing is known of, neither from the data nor before, has no density and is left alone
         dead = np.max(np.abs(jac), axis=0, initial=0.0) * descent.scale <= NOTHING * scales.peak
         free = ~bound & ~(dead & (weak == 0))
-        linear = Linear(residual, jac[:, free], offset[free], weak[free])
-        v, m = _amplitudes(linear, parts, widths, scales.blocked, v, anew, bench.costly, course.settled)
+        every = Linear(residual, jac, offset, weak)
+        linear = every.of(free)
+        # anew from where all is wide that may be; where predictions are costly fits are few, and both are tried
+        begin = frozenset({"wide"} if anew else {"there"}) | ({"there"} if bench.costly else set())
+        v, m = _amplitudes(linear, parts, widths, scales.blocked, v, begin, course.settled)
         anew = False
         value = m.value + 0.5 * int(np.sum(free)) * math.log(2 * math.pi)
         # of these parameters, and not of those that a straight line leads to: the parts move with the prediction
@@ -176,7 +179,7 @@ def weigh(
             if q is not None
         )
         # what rests on a bound was left out of the integral: its own factor, and its prior's square, follow
-        held = _on_bounds(scales, parts, v, residual, jac, resting, weak, offset, free, m.precision)
+        held = _on_bounds(scales, parts, v, every, resting, free, m.precision)
         occam = amplitude_mass(linear, parts, widths, scales.blocked, v, m)
         total = value + held + occam
         if best is None or total > best.total + 1e-6:
@@ -212,23 +215,23 @@ def _anchored(bench: Bench, fit: Refit, start: Mapping[str, float], shortened: i
 
 
 def _amplitudes(
-    linear, parts, widths: Widths, blocked, v, anew: bool, both: bool, settled: float
+    linear: Linear, parts, widths: Widths, blocked, v, begin: frozenset[str], settled: float
 ) -> tuple[np.ndarray, Marginal]:
-    """`amplitudes` from `v`; anew also from where all is wide that may be: alone, or beside that from `v`.
+    """`amplitudes` from where all is wide that may be ("wide"), from `v` ("there"), or the better of both.
 
     A part that is empty, as that of effects is where none acts, stays at nothing.
     """
     v, tried = np.where([p.factor is None or np.any(p.factor) for p in parts], v, 0.0), []
-    if anew:
+    if "wide" in begin:
         wide = amplitudes(linear, parts, widths.widest, blocked, v, tolerance=settled)[0]
         tried.append(amplitudes(linear, parts, widths, blocked, wide))
-    if both or not anew:
+    if "there" in begin:
         tried.append(amplitudes(linear, parts, widths, blocked, v))
     return max(tried, key=lambda t: t[1].value + float(np.sum(widths.log_shape(t[0] / widths.width**2))))
 
 
-def _on_bounds(scales, parts, v, residual, jac, resting: Resting, weak, offset, free, precision) -> float:
-    """Log mass beside the bounds of what rests on them.
+def _on_bounds(scales: Scales, parts, v, every: Linear, resting: Resting, free, precision) -> float:
+    """Log mass beside the bounds of what rests on them, of `every` parameter of a set.
 
     Each with the `free` parameters, of that precision, integrated out: what they take up of its curvature is no
     information on it. Of two on their bounds the other is held.
@@ -248,7 +251,8 @@ def _on_bounds(scales, parts, v, residual, jac, resting: Resting, weak, offset, 
         light = solve(a)
         return light - g @ np.linalg.solve(inner, u.T @ light)
 
-    w, total = whole(residual), 0.0
+    jac, weak, offset = every.jacobian, every.weak, every.offset
+    w, total = whole(every.residual), 0.0
     others = whole(jac[:, free])
     for i in np.flatnonzero(resting.on):
         slope = float(resting.side[i]) * float(weak[i] * offset[i] - jac[:, i] @ w)
