@@ -12,7 +12,8 @@ python fits/real-panel/matters.py criteria.rig effort.hopeful each halved and do
 python fits/real-panel/matters.py all                         each number halved and doubled
 python fits/real-panel/matters.py table                       matters.csv, matters.png and the table in README.md again
 
-MATTERS_PART=0/2 shares the samples between two processes; `table` is asked when both are done.
+MATTERS_PART=0/2 shares the samples between two processes; `table` is asked when both are done. MATTERS_EVERY=40 asks
+every fortieth sample: a trial of the command, and no result.
 """
 
 import csv
@@ -46,7 +47,7 @@ from tissuejax.storage import write_figure, write_json, write_text  # noqa: E402
 
 BEGIN, END = "<!-- matters: written by matters.py -->", "<!-- end of matters -->"
 RUNS = HERE / "runs" / "matters"
-EVERY, FACTORS = 4, (0.5, 2.0)
+EVERY, FACTORS = int(os.environ.get("MATTERS_EVERY", "4")), (0.5, 2.0)
 # These decide what is tried or looked for, before any set is weighed: asked by a search.
 SEARCHED = ("effort", "criteria.shown", "criteria.means", "criteria.sudden", "criteria.shares.sudden")
 SEARCHED += tuple(f"criteria.smooth.{name}" for name in ("clock", "edge", "moments"))
