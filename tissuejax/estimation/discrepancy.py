@@ -72,7 +72,7 @@ class Part:
     name: str
     family: str
     factor: Float[np.ndarray, "N r"] | None = None
-    within: tuple[Float[np.ndarray, "n n"], ...] | None = None
+    within: tuple[Float[np.ndarray, "_ _"], ...] | None = None
 
 
 def loading_states(strain: Float[np.ndarray, " n"], smooth: Smoothness = USUAL) -> Float[np.ndarray, "n w"]:
@@ -144,12 +144,12 @@ class Discrepancy:
         sudden: what may have happened at once.
     """
 
-    laws: tuple[tuple[str, Float[np.ndarray, "N r"]], ...]
+    laws: tuple[tuple[str, Float[np.ndarray, "N _"]], ...]
     belongs: Float[np.ndarray, "N R"]
     own: Float[np.ndarray, "N q"]
     turning: tuple[Part, ...]
     fixed: tuple[Part, ...]
-    fading: tuple[Float[np.ndarray, "n n"], ...]
+    fading: tuple[Float[np.ndarray, "_ _"], ...]
     nearly: Float[np.ndarray, "N e"]
     in_time: Float[np.ndarray, "N f"]
     timed: Timed | None = None
