@@ -8,6 +8,7 @@ import dataclasses
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.effort import Effort
@@ -86,7 +87,7 @@ def _members(at: object) -> list[tuple[str, object]]:
     return [(str(i), x) for i, x in enumerate(at)] if isinstance(at, tuple) else []
 
 
-def _with(at, path: list[str], value: float):
+def _with(at: Any, path: list[str], value: float) -> Any:
     if not path:
         return value
     name, rest = path[0], path[1:]
