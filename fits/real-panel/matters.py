@@ -54,7 +54,8 @@ SEARCHED += tuple(f"criteria.smooth.{name}" for name in ("clock", "edge", "momen
 # A judge alone reads these: the sets as they are weighed usually, judged again.
 JUDGED = tuple(f"criteria.{name}" for name in ("sizes", "coarse", "negligible", "named", "covered", "strong"))
 # Of other kinds of recordings, or of a page: no sample of the panel feels them.
-ELSEWHERE = ("criteria.simulated", "criteria.strokes", "criteria.unseen", "effort.promised", "effort.shown")
+ELSEWHERE = ("criteria.simulated", "criteria.strokes", "criteria.unseen", "criteria.twins")
+ELSEWHERE += tuple(f"effort.{name}" for name in ("promised", "shown", "rivals", "course.shortened"))
 ELSEWHERE += tuple(f"criteria.shares.{name}" for name in ("marker", "onset", "peak", "numerical"))
 USUAL = "as they are"
 COLUMNS = ("answers that change", "cause named", "a wrong name", "null alarms")
@@ -71,8 +72,13 @@ def samples() -> list[panel_samples.Entry]:
 
 
 def numbers() -> list[str]:
-    """Those that a sample of the panel can feel."""
-    return [p for p in Numbers().all() if not under(p, ELSEWHERE)]
+    """Those that a sample of the panel can feel, and that have a half and a double."""
+    return [p for p, x in Numbers().all().items() if x and not under(p, ELSEWHERE)]
+
+
+def way_of(path: str) -> str:
+    """How a number is asked."""
+    return "searched" if under(path, SEARCHED) else "weighed"
 
 
 def name_of(path: str, factor: float) -> str:
@@ -173,7 +179,7 @@ def table() -> str:
         raise InputError("not all samples were asked with the usual numbers: matters.py found, then any number")
     rows = [row(USUAL, 1.0, way, usual[way]) for way in usual]
     for path in numbers():
-        way = "searched" if under(path, SEARCHED) else "weighed"
+        way = way_of(path)
         rows += [row(path, factor, way, usual[way]) for factor in FACTORS]
     rows = [r for r in rows if r is not None]
     text = io.StringIO()
@@ -226,7 +232,7 @@ def main(given: Sequence[str]) -> str:
     if not given or given[0] in ("-h", "--help"):
         return __doc__ or ""
     if given[0] == "list":
-        ways = {p: "searched" if under(p, SEARCHED) else "weighed" for p in numbers()}
+        ways = {p: "judged" if under(p, JUDGED) else way_of(p) for p in numbers()}
         return "\n".join(f"{p:<40}{Numbers().all()[p]:<12g}{ways[p]}" for p in ways)
     if given[0] == "table":
         return table()
