@@ -50,20 +50,17 @@ def test_an_effect_half_as_large_beforehand_weighs_what_its_prior_says(searched)
     """The amplitude's prior is normal about none with a width s in proportion to `change`, and data say all of the
     amplitude a: the evidence goes by the prior's density at a, exp(-a^2 / 2 s^2) / s. Its base knows nothing of it."""
     whole, cut, of, found = searched
-    best = found.exploration.weighed[frozenset({"relax"})]
-    scales = found.exploration.scales
-    stored = Found(
-        tuple(
-            Rested(w.evidence.keys, w.refit.values, tuple(w.v)) for w in (found.exploration.weighed[frozenset()], best)
-        )
-    )
+    weighed, scales = found.exploration.weighed, found.exploration.scales
+    best = weighed[frozenset({"relax"})]
+    stored = Found((Rested.of(weighed[frozenset()]), Rested.of(best)))
     said = {}
     for factor in (1.0, 0.5):
         criteria = Numbers().changed("criteria.change", factor).criteria
         said[factor] = by_keys(reweighed(whole, cut, of, stored, criteria))
     # half as wide: log 2 for the height, and four times the square
+    # half as wide: twice as high, and four times the square
     a = best.refit.values["relax.g"]
-    s = scales.effect_size(whole.candidates["relax"], best.refit.values, Criteria())["relax.g"]
+    s = scales.effect_size(whole.candidates["relax"], best.begun, Criteria())["relax.g"]
     expected = math.log(2.0) - 0.5 * (a / s) ** 2 * (4.0 - 1.0)
     assert said[0.5][("relax",)] - said[1.0][("relax",)] == pytest.approx(expected, abs=0.1)
     assert said[0.5][()] == pytest.approx(said[1.0][()], abs=1e-6)
@@ -72,6 +69,6 @@ def test_an_effect_half_as_large_beforehand_weighs_what_its_prior_says(searched)
 def test_a_set_that_is_not_offered_is_refused(searched):
     whole, cut, of, found = searched
     stored = Found.of(found.exploration)
-    stranger = Found((*stored.sets, Rested(("magnetism",), {}, ())))
+    stranger = Found((*stored.sets, Rested(("magnetism",), {}, (), {})))
     with pytest.raises(InputError, match="magnetism"):
         reweighed(whole, cut, of, stranger, Criteria())

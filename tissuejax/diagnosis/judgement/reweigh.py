@@ -21,7 +21,7 @@ from tissuejax.diagnosis.judgement.judge import left, log_prior
 from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.search import based, rooted
 from tissuejax.diagnosis.judgement.sudden import joined, scanned
-from tissuejax.diagnosis.judgement.weigh import Start, weigh
+from tissuejax.diagnosis.judgement.weigh import Start, Weighed, weigh
 from tissuejax.errors import InputError
 from tissuejax.estimation.discrepancy import Discrepancy
 
@@ -34,11 +34,22 @@ class Rested:
         keys: candidates in the set.
         values: its parameters.
         v: squared amplitudes of the discrepancy.
+        begun: values at which it began, by which the priors of its amplitudes go.
     """
 
     keys: tuple[str, ...]
     values: Mapping[str, float]
     v: tuple[float, ...]
+    begun: Mapping[str, float]
+
+    @classmethod
+    def of(cls, w: Weighed) -> "Rested":
+        """Of a set that was weighed."""
+        return cls(w.evidence.keys, dict(w.refit.values), tuple(w.v.tolist()), dict(w.begun))
+
+    def start(self, parts: int | None = None) -> Start:
+        """From there; with the amplitudes of the first `parts` alone."""
+        return Start(dict(self.begun), np.array(self.v[:parts]), at=dict(self.values))
 
 
 @dataclass(frozen=True)
@@ -71,10 +82,7 @@ class Found:
         kept = [w for w in ranked if w.evidence.keys and weight[w.evidence.keys] > top - near][:most]
         of = e.scales.discrepancy
         moments = tuple(m.name for m in of.sudden) if isinstance(of, Discrepancy) else ()
-        rested = (
-            Rested(w.evidence.keys, dict(w.refit.values), tuple(w.v.tolist())) for w in (e.weighed[frozenset()], *kept)
-        )
-        return cls(tuple(rested), moments, tuple(held_out))
+        return cls(tuple(Rested.of(w) for w in (e.weighed[frozenset()], *kept)), moments, tuple(held_out))
 
     def as_dict(self) -> dict:
         """For a file."""
@@ -83,7 +91,7 @@ class Found:
     @classmethod
     def read(cls, given: Mapping) -> "Found":
         """From `as_dict`."""
-        sets = tuple(Rested(tuple(s["keys"]), s["values"], tuple(s["v"])) for s in given["sets"])
+        sets = tuple(Rested(tuple(s["keys"]), s["values"], tuple(s["v"]), s["begun"]) for s in given["sets"])
         return cls(sets, tuple(given["moments"]), tuple(given["held_out"]))
 
 
@@ -104,9 +112,8 @@ def reweighed(
     effort = effort or Effort(rounds=2)
     course = replace(effort.course, rounds=effort.rounds, iterations=effort.iterations)
     base, *others = found.sets
-    v = np.array(base.v)
     # what happened at once comes in last: it begins beside the base with all else
-    start = Start(dict(base.values), v[: len(v) - len(found.moments)])
+    start = base.start(len(base.v) - len(found.moments))
     scales, first = based(bench, cut, of, criteria, replace(effort, course=course), Kept(), start)
     known = {m.name: m for m in scanned(scales)} if found.moments else {}
     for name in found.moments:
@@ -114,11 +121,11 @@ def reweighed(
             raise InputError(f"{name}: no longer one of the moments that are scanned; search again")
         scales = joined(scales, known[name])
     if found.moments:
-        first = weigh(scales, (), Start(first.refit.values, v), criteria, course)
+        first = weigh(scales, (), base.start(), criteria, course)
     rooted(scales, first, bench.free)
     sets = [first.evidence]
     for s in others:
-        sets.append(weigh(scales, s.keys, Start(dict(s.values), np.array(s.v)), criteria, course).evidence)
+        sets.append(weigh(scales, s.keys, s.start(), criteria, course).evidence)
     names = [c.name for c in bench.candidates.values()]
     forms = {n: names.count(n) for n in dict.fromkeys(names)}
     fitted = tuple(n for n in bench.fitted if n not in found.held_out)

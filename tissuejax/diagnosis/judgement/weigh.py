@@ -9,7 +9,7 @@ Positive shapes have normal priors of their logarithms. Fit and amplitudes of th
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -50,6 +50,7 @@ class Weighed:
         rest: the discrepancy's posterior mean over the blocks, Pa.
         bench: that it was weighed on; `settled`: whether its predictions are exact at the fit.
         linear: the problem about the fit; None of an impossible set.
+        begun: values at which it began, by which the priors of its amplitudes go.
     """
 
     evidence: SetEvidence
@@ -60,6 +61,7 @@ class Weighed:
     bench: Bench | None = None
     settled: bool = True
     linear: Linear | None = None
+    begun: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -195,7 +197,7 @@ def weigh(
         at, tolerance = dict(fit.values), tolerance if bench.costly else course.later
     if best is None:
         return _impossible(scales, keys)
-    return replace(_described(scales, keys, best, criteria), settled=course.anchor)
+    return replace(_described(scales, keys, best, criteria), settled=course.anchor, begun=dict(start.values))
 
 
 def _anchored(bench: Bench, fit: Refit, start: Mapping[str, float], shortened: int) -> tuple[Bench, Refit]:
