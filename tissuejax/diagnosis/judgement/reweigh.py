@@ -14,11 +14,12 @@ import numpy as np
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.judgement.criteria import Criteria
-from tissuejax.diagnosis.judgement.effort import Effort
+from tissuejax.diagnosis.judgement.effort import Course, Effort
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.explore import Exploration
 from tissuejax.diagnosis.judgement.judge import left, log_prior
 from tissuejax.diagnosis.judgement.kept import Kept
+from tissuejax.diagnosis.judgement.scales import Scales
 from tissuejax.diagnosis.judgement.search import based, rooted
 from tissuejax.diagnosis.judgement.sudden import joined, scanned
 from tissuejax.diagnosis.judgement.weigh import Start, Weighed, weigh
@@ -121,12 +122,20 @@ def reweighed(
             raise InputError(f"{name}: no longer one of the moments that are scanned; search again")
         scales = joined(scales, known[name])
     if found.moments:
-        first = weigh(scales, (), base.start(), criteria, course)
+        first = _followed(scales, base, criteria, course)
     rooted(scales, first, bench.free)
     sets = [first.evidence]
     for s in others:
-        sets.append(weigh(scales, s.keys, s.start(), criteria, course).evidence)
+        sets.append(_followed(scales, s, criteria, course).evidence)
     names = [c.name for c in bench.candidates.values()]
     forms = {n: names.count(n) for n in dict.fromkeys(names)}
     fitted = tuple(n for n in bench.fitted if n not in found.held_out)
     return Evidence(tuple(sets), forms, fitted, found.held_out)
+
+
+def _followed(scales: Scales, s: Rested, criteria: Criteria, course: Course) -> Weighed:
+    """A set where it rests, and from there on; the better of both, as a search keeps it. The first fit of a set leaves
+    out what laws of effects err by, and may lead away from there."""
+    still = replace(course, rounds=1, iterations=0)
+    tried = [weigh(scales, s.keys, s.start(), criteria, c) for c in (still, course)]
+    return max(tried, key=lambda w: w.evidence.log_evidence)
