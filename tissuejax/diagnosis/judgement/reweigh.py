@@ -115,14 +115,13 @@ def reweighed(
     base, *others = found.sets
     # what happened at once comes in last: it begins beside the base with all else
     start = base.start(len(base.v) - len(found.moments))
-    scales, first = based(bench, cut, of, criteria, replace(effort, course=course), Kept(), start)
+    scales, _ = based(bench, cut, of, criteria, replace(effort, course=course), Kept(), start)
     known = {m.name: m for m in scanned(scales)} if found.moments else {}
     for name in found.moments:
         if name not in known:
             raise InputError(f"{name}: no longer one of the moments that are scanned; search again")
         scales = joined(scales, known[name])
-    if found.moments:
-        first = _followed(scales, base, criteria, course)
+    first = _followed(scales, base, criteria, course)
     rooted(scales, first, bench.free)
     sets = [first.evidence]
     for s in others:
