@@ -30,7 +30,10 @@ QUICK ?= --xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=2
 
 # Tests of the lower floors, whose shapes and types are checked while they run (tests/conftest.py).
 SHAPED := tests/contracts/test_energies.py tests/contracts/test_energies_orders.py tests/contracts/test_elements.py \
-    tests/contracts/test_cohesion.py tests/analytic/test_tensors.py
+    tests/contracts/test_cohesion.py tests/analytic/test_tensors.py tests/estimation/test_level.py \
+    tests/estimation/test_noise.py tests/estimation/test_series.py tests/estimation/test_descent.py \
+    tests/contracts/test_recordings_ground.py tests/contracts/test_recordings_hdf5.py \
+    tests/contracts/test_recordings_tables.py
 # slipcover rewrites a line's counter away once it ran: 4 % more CPU, where coverage.py's tracer (before Python 3.12) took
 # 32 %. The longest files come first (tests/conftest.py).
 PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 XLA_FLAGS="$(QUICK)" $(BIN)/python -m slipcover --json
@@ -45,7 +48,7 @@ test: $(STAMP)
 
 shaped: $(STAMP)
 	mkdir -p out
-	TISSUEJAX_SHAPES=on $(PYTEST) --source tissuejax/energies,tissuejax/elements,tissuejax/cohesion \
+	TISSUEJAX_SHAPES=on $(PYTEST) --source tissuejax/energies,tissuejax/elements,tissuejax/cohesion,tissuejax/recordings,tissuejax/estimation \
 	    --out out/shaped.coverage.json $(WORKERS) $(SHAPED)
 
 # What it said is kept in tests/slow.json, with date and commit.

@@ -1,6 +1,7 @@
 """Shared by all tests: double precision, one folder of compiled programs a run, outside data, seeded randomness."""
 
 import gc
+import importlib
 import os
 import shutil
 import sys
@@ -16,8 +17,10 @@ from jaxtyping import install_import_hook
 # Shapes and types of the lower floors, checked while their own tests run (`make test`, or TISSUEJAX_SHAPES=on pytest);
 # the hook comes before anything of them is imported.
 CHECKED = ("tensors", "spectral", "parameters", "energies", "elements", "cohesion")
+CHECKED += ("recordings", "estimation")
 if os.environ.get("TISSUEJAX_SHAPES") == "on":
-    install_import_hook([f"tissuejax.{room}" for room in CHECKED], "beartype.beartype")
+    importlib.import_module("tests.shapes")
+    install_import_hook([f"tissuejax.{room}" for room in CHECKED], "tests.shapes.checked")
     sys.meta_path.insert(1, sys.meta_path.pop(0))  # slipcover's stays first: it counts lines of what this one loads
 
 jax.config.update("jax_enable_x64", True)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import tissuejax as tj
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.diagnosis.transfer import transfer
 from tissuejax.energies.catalogue import energy

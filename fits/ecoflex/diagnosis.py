@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import tissuejax as tj
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read_all

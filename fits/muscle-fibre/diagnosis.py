@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import tissuejax as tj
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.diagnosis.transfer import transfer
 from tissuejax.energies.catalogue import energy

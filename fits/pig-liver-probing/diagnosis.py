@@ -18,7 +18,7 @@ from scipy.optimize import minimize
 from tissuejax.diagnosis.bench import Bench, Candidate, Free
 from tissuejax.diagnosis.judgement import answer as judged
 from tissuejax.diagnosis.judgement.blocks import State, blocks, series, strain
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.errors import InputError
 from tissuejax.estimation.discrepancy import discrepancy
 from tissuejax.estimation.series import Segment

@@ -8,7 +8,7 @@ tissuejax study fits/porcine-skin
 from pathlib import Path
 
 import tissuejax as tj
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.report.diagnosis_page import write_diagnosis
 from tissuejax.report.page import write_figures

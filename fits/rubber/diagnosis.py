@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import tissuejax as tj
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.recordings.recording import Channel, Sample
 from tissuejax.report.diagnosis_page import write_diagnosis

@@ -7,7 +7,7 @@ import numpy as np
 from tissuejax.diagnosis.bench import Bench, Candidate, Free
 from tissuejax.diagnosis.judgement.answer import Answered, answer
 from tissuejax.diagnosis.judgement.blocks import blocks, driven_states, series
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.estimation.discrepancy import discrepancy
 from tissuejax.estimation.series import Segment
 

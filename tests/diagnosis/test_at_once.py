@@ -8,7 +8,7 @@ from scipy.stats import halfnorm
 from test_judgement import made
 
 from tissuejax.diagnosis.diagnose import diagnose
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.judgement.marginal import Widths, amplitudes, marginal
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
 from tissuejax.diagnosis.judgement.sudden import gains

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tissuejax.diagnosis.diagnose import diagnose
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 

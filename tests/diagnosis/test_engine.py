@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from spring_bench import judged, spring
 
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.locate import locate
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.refit import refit

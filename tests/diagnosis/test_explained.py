@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from spring_bench import Spring, judged, spring
 
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 
 
 def test_a_recording_of_next_to_no_noise_does_not_count_for_all():

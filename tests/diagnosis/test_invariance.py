@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tissuejax.diagnosis.diagnose import diagnose
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.recordings import files
 from tissuejax.recordings.recording import Channel, Recording, Sample
 

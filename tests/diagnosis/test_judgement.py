@@ -12,7 +12,8 @@ from tissuejax.diagnosis.judgement.evidence import Evidence, SetEvidence, read_e
 from tissuejax.diagnosis.judgement.judge import Kind, judge
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, amplitudes, marginal
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
-from tissuejax.estimation.discrepancy import BAND, Part, Series, discrepancy, loading_states
+from tissuejax.estimation.discrepancy import Part, Series, discrepancy, loading_states
+from tissuejax.estimation.smoothness import USUAL
 
 FORMS = {"relaxation": 2, "slack": 1, "drift": 3}
 
@@ -304,8 +305,8 @@ def test_the_loading_state_knows_the_way_and_not_the_rate():
     assert h[399, 0] == pytest.approx(1.0, abs=1e-3)
     assert h[799, 0] == pytest.approx(-1.0, abs=1e-3)
     # after a path s in one direction the wide state is 1 - exp(-s / 0.3), less what the play takes at the start
-    assert h[199, 2] == pytest.approx(1 - math.exp(-(0.5 - 2 * BAND) / 0.3), abs=0.02)
-    trembling = 0.5 + 0.4 * BAND * np.sin(np.arange(300.0))
+    assert h[199, 2] == pytest.approx(1 - math.exp(-(0.5 - 2 * USUAL.band) / 0.3), abs=0.02)
+    trembling = 0.5 + 0.4 * USUAL.band * np.sin(np.arange(300.0))
     assert not loading_states(np.concatenate([[0.0, 1.0], trembling]))[2:, 0].max() > 0
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from tissuejax.diagnosis.diagnose import diagnose
 from tissuejax.diagnosis.judgement.coloured import means_covariance
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.estimation.noise import Noise
 from tissuejax.recordings.recording import Channel, Recording, Sample
 from tissuejax.report.judged_sentences import sure

@@ -10,7 +10,8 @@ from tissuejax.diagnosis.judgement.scales import scaled
 from tissuejax.diagnosis.material import MaterialBench, strain_states
 from tissuejax.diagnosis.offered import offered
 from tissuejax.energies.neo_hookean import NeoHookean
-from tissuejax.estimation.discrepancy import BAND, Series, discrepancy, loading_states
+from tissuejax.estimation.discrepancy import Series, discrepancy, loading_states
+from tissuejax.estimation.smoothness import USUAL
 from tissuejax.recordings.recording import NO_TIME, Channel, Recording, Sample
 
 
@@ -32,7 +33,7 @@ def pull(stretch: np.ndarray) -> Recording:
 )
 def test_what_depends_on_the_way_is_hysteresis_where_something_turns_and_a_law_where_nothing_does(way, kind):
     """A drive that trembles has not turned round."""
-    way = way + 0.2 * BAND * np.ptp(way) * np.sin(np.arange(50.0))
+    way = way + 0.2 * USUAL.band * np.ptp(way) * np.sin(np.arange(50.0))
     one = Series("a", "pull", np.arange(50.0), way[:, None], loading_states(way), 100.0)
     parts = discrepancy([one], np.ones(50)).about(100 * np.ones(50))
     assert {p.family for p in parts} & {"added law", "hysteresis"} == {kind}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from spring_bench import judged, spring
 
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.diagnosis.stiffness_map import StiffnessMap

@@ -9,11 +9,12 @@ import pytest
 from tests.probing.bench import VALUES, measured, recording, sample
 from tissuejax.cache import source
 from tissuejax.diagnosis import probing_free
+from tissuejax.diagnosis.judgement.particular import SIMULATED
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_runs import COARSE, FINE, RETIMED
 from tissuejax.diagnosis.probing_series import calmed
-from tissuejax.diagnosis.probing_view import LEFT, REMAINS, ProbingView
+from tissuejax.diagnosis.probing_view import ProbingView
 from tissuejax.diagnosis.refit import refit
 from tissuejax.energies.catalogue import energy
 from tissuejax.estimation.series import Segment
@@ -129,7 +130,7 @@ def test_a_view_is_the_fine_simulation_at_its_anchor_and_weighs_every_channel_al
     fine, slow, coarse = (bench.runs.many([(bench.at(VALUES), bench.fitted, k)])[0] for k in (FINE, RETIMED, COARSE))
     late = view._held_back(slow, coarse)
     exact = near.natural(near.predict(VALUES))
-    np.testing.assert_allclose(exact, fine + LEFT * late, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(exact, fine + SIMULATED.late * late, rtol=1e-9, atol=1e-12)
     # beside the anchor it changes as the coarse simulation does
     other = VALUES | {"energy.C10": 1.1 * VALUES["energy.C10"]}
     twice = [bench.runs.many([(bench.at(v), bench.fitted, COARSE)])[0] for v in (VALUES, other)]
@@ -181,7 +182,7 @@ def test_what_is_open_is_a_column_for_every_channel_of_every_recording(bench):
         assert columns.shape == (len(bench.y), len(pairs))
         assert (np.count_nonzero(columns, axis=1) <= 1).all()
     mesh = near.numerical["mesh"].sum(axis=1) * near.unit
-    np.testing.assert_allclose(mesh, REMAINS * bench.calmed(fine - slow), rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(mesh, SIMULATED.remains * bench.calmed(fine - slow), rtol=1e-6, atol=1e-12)
 
 
 def test_a_wave_between_probe_and_support_is_smoothed_away_and_what_is_slow_stays():
@@ -223,7 +224,7 @@ def test_a_correction_is_taken_anew_where_a_set_begins_far_from_it(bench):
     moved = view.nearer(far)
     fine, slow, coarse = bench.runs.many([(bench.at(far), bench.fitted, k) for k in (FINE, RETIMED, COARSE)])
     assert np.array_equal(moved.place, coarse)
-    exact = fine + LEFT * view._held_back(slow, coarse)
+    exact = fine + SIMULATED.late * view._held_back(slow, coarse)
     np.testing.assert_allclose(moved.natural(moved.predict(far)), exact, atol=1e-9)
     force = next(s.rows for s in bench.segments if s.label == "force z" and s.recording == "a")
     missed = (view.natural(view.predict(far)) - exact)[force]

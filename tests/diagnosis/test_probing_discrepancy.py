@@ -8,8 +8,8 @@ import pytest
 from tissuejax.diagnosis.judgement.blocks import blocks
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, amplitudes
+from tissuejax.diagnosis.judgement.particular import SIMULATED
 from tissuejax.diagnosis.probing_discrepancy import probing_discrepancy
-from tissuejax.diagnosis.probing_view import BLOCKS
 from tissuejax.estimation.series import Segment
 
 NOISE = {"force": 0.007, "markers": 0.02}  # of the largest value, as in careful recordings
@@ -29,14 +29,14 @@ def presses():
                 segments.append(Segment(name, channel, c, rows, time, "N", depth, "depth", "m"))
                 truth.append((depth / 5e-3) ** 1.5 * (1.0 if c in ("z", "marker 0 z") else rng.uniform(0.1, 0.5)))
                 sigma.append(np.full(n, NOISE[channel]))
-    view = SimpleNamespace(segments=segments, y=np.concatenate(truth), sigma=np.concatenate(sigma))
+    view = SimpleNamespace(numbers=SIMULATED, segments=segments, y=np.concatenate(truth), sigma=np.concatenate(sigma))
     return view, view.y.copy()
 
 
 def left(presses, added, seed=0):
     """Amplitudes of the parts, by name, where `added` (a long vector) and noise are left of the truth."""
     view, truth = presses
-    cut = blocks(view, BLOCKS)
+    cut = blocks(view, SIMULATED.means)
     parts = probing_discrepancy(view, cut).about(cut.mean(truth))
     edges = np.flatnonzero(np.diff(cut.owner, prepend=-1))
     rows = tuple(slice(int(a), int(b)) for a, b in zip(edges, [*edges[1:], len(cut.starts)], strict=True))
@@ -86,7 +86,7 @@ def test_a_misplaced_marker_is_its_own_and_no_law_of_the_force(presses):
 
 def test_parts_that_scale_with_a_force_hold_no_constant_share_of_it(presses):
     view, truth = presses
-    cut = blocks(view, BLOCKS)
+    cut = blocks(view, SIMULATED.means)
     force = np.array([view.segments[k].channel == "force" for k in cut.owner])
     alike = np.where(force, cut.mean(truth) / cut.spread(view.sigma) ** 2, 0.0)
     size = np.linalg.norm(alike)

@@ -7,7 +7,7 @@ import pytest
 from spring_bench import judged, spring
 
 from tissuejax.diagnosis.diagnose import diagnose
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.material import MaterialBench
 from tissuejax.energies.catalogue import energy
 from tissuejax.errors import InputError, NotConverged

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tissuejax.diagnosis.diagnose import diagnose
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 TRIED = ("clock-lag", "load-cell-bend", "viscoelasticity", "energy-form", "slack", "drift")

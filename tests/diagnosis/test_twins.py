@@ -9,6 +9,7 @@ import pytest
 from tissuejax.diagnosis.bench import Candidate
 from tissuejax.diagnosis.diagnose import diagnose
 from tissuejax.diagnosis.judgement.answer import shown_fit
+from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.twins import merged
 from tissuejax.effects.viscoelasticity import Viscoelasticity
 from tissuejax.fitting.advice import _twins
@@ -22,7 +23,7 @@ def three(values):
     paths = {n: V + n for n in ("g1", "g2", "g3", "tau1", "tau2", "tau3")}
     c = Candidate("viscoelasticity", tuple(paths[f"g{i}"] for i in (1, 2, 3)),
                   tuple(paths[f"tau{i}"] for i in (1, 2, 3)), form="three times of the moduli")  # fmt: skip
-    return merged(c, {paths[n]: v for n, v in values.items()})
+    return merged(c, {paths[n]: v for n, v in values.items()}, Criteria().twins)
 
 
 def test_shares_of_like_times_are_added():

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from tissuejax.diagnosis.judgement.answer import answer
 from tissuejax.diagnosis.judgement.blocks import blocks, series
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.material import MaterialBench, strain_states
 from tissuejax.energies.catalogue import energy
 from tissuejax.estimation.discrepancy import discrepancy

@@ -12,9 +12,10 @@ from spring_bench import FREE, START, Spring, spring
 from tissuejax.diagnosis.bench import Candidate, Free
 from tissuejax.diagnosis.judgement.blocks import blocks, driven_states, series
 from tissuejax.diagnosis.judgement.criteria import Criteria
-from tissuejax.diagnosis.judgement.explore import Effort, Exploration
+from tissuejax.diagnosis.judgement.effort import Course, Effort
+from tissuejax.diagnosis.judgement.explore import Exploration
 from tissuejax.diagnosis.judgement.scales import scaled
-from tissuejax.diagnosis.judgement.weigh import weigh
+from tissuejax.diagnosis.judgement.weigh import Start, weigh
 from tissuejax.estimation.discrepancy import discrepancy
 
 FIBRES = Candidate("fibres", ("fibre.k",), ("fibre.onset",), ({"fibre.onset": 5.0},))
@@ -54,14 +55,14 @@ def scales(bench):
     cut, start = blocks(bench), {p: bench.start[p] for p in bench.base}
     of = discrepancy(series(bench, cut, driven_states(bench)), cut.spread(bench.sigma))
     out = scaled(bench, cut, of, bench.y, start)
-    base = weigh(out, (), start, Criteria())
+    base = weigh(out, (), Start(start), Criteria())
     out.values, out.reference = base.refit.values, cut.mean(base.refit.prediction)
     return out, base
 
 
 def test_fibres_that_nothing_stretches_are_void(bench):
     on, base = scales(bench)
-    found = weigh(on, ("fibres",), {**base.refit.values, "fibre.k": 12.0}, Criteria())
+    found = weigh(on, ("fibres",), Start({**base.refit.values, "fibre.k": 12.0}), Criteria())
     assert found.evidence.void
     assert np.isfinite(found.evidence.log_evidence)
     # all that they add is a prior that the data say nothing of: its mass is one, and the evidence is the base's
@@ -88,7 +89,7 @@ def test_a_set_that_can_not_be_predicted_is_void_and_not_ranked(bench, beyond):
     bench.beyond = beyond
     on, base = scales(bench)
     bench.most = -1.0
-    found = weigh(on, ("form",), base.refit.values, Criteria())
+    found = weigh(on, ("form",), Start(base.refit.values), Criteria())
     assert found.evidence.void
     assert found.evidence.log_evidence == -np.inf
     e = Exploration(bench, Criteria(), Effort(), on)
@@ -113,9 +114,9 @@ def test_sets_that_may_still_come_to_the_top_are_those_near_it(bench):
 
 def test_the_share_explained_is_none_for_the_base_and_nearly_all_for_the_truth(bench):
     on, base = scales(bench)
-    again = weigh(on, (), base.refit.values, Criteria())
+    again = weigh(on, (), Start(base.refit.values), Criteria())
     assert again.evidence.explained == pytest.approx(0.0, abs=0.05)
-    found = weigh(on, ("relax",), base.refit.values | {"relax.g": 0.2}, Criteria())
+    found = weigh(on, ("relax",), Start(base.refit.values | {"relax.g": 0.2}), Criteria())
     assert 0.95 < found.evidence.explained <= 1.0
 
 
@@ -123,7 +124,7 @@ def test_the_share_explained_is_none_for_the_base_and_nearly_all_for_the_truth(b
 def test_the_density_is_that_of_the_parameters_reached(bench, iterations):
     """Not of those that a straight line leads to from there: the discrepancy moves with what they predict."""
     on, _ = scales(bench)
-    found = weigh(on, (), {"a": 60.0, "b": -20.0}, Criteria(), rounds=1, iterations=iterations)
+    found = weigh(on, (), Start({"a": 60.0, "b": -20.0}), Criteria(), Course(rounds=1, iterations=iterations))
     left = on.cut.mean(bench.y - found.refit.prediction)
     covariance = block_diag(*on.blocked.within(found.parts, found.v))
     for part, v in zip(found.parts, found.v, strict=True):

@@ -1,6 +1,7 @@
 """`tissuejax challenge`: make sealed cases, run the diagnosis over them, open the keys and grade."""
 
 import argparse
+from collections import Counter
 from pathlib import Path
 from typing import ClassVar
 
@@ -10,7 +11,10 @@ from tissuejax.challenge.make import KINDS, make
 from tissuejax.challenge.run import run
 from tissuejax.commands.arguments import positive, seed
 from tissuejax.commands.command import Command, Reply
+from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.numbers import Numbers
 from tissuejax.diagnosis.judgement.rejudge import rejudge
+from tissuejax.errors import InputError
 from tissuejax.progress import for_terminal
 from tissuejax.report.challenge_table import figures
 
@@ -26,17 +30,25 @@ Measure the diagnosis like a medical test. `make` draws cases from a seed (mater
 an implicit finite-element solver; neither shares code with the diagnosis), writes the recordings, seals the truth in a
 file of its own and keeps that file's hash. `run` diagnoses case by case and goes on where it was interrupted. `grade`
 checks the hash, opens the truth and writes graded.csv, confusion.csv, by_size.csv, graded.json and figures. `rivals`
-says what simpler ways of answering would have said on the same cases.
+says what simpler ways of answering would have said on the same cases. `judge` asks the stored evidence of every case
+that was run for its verdict again, in milliseconds a case, and rewrites it: for when the rules of the judgement have
+changed. With --number it says what one other number would make of it, and writes nothing.
 
   tissuejax challenge make out/challenge --kind material --count 210 --seed 7
   tissuejax challenge run out/challenge --jobs 2
+  tissuejax challenge judge out/challenge
+  tissuejax challenge judge out/challenge --number criteria.coarse=100
   tissuejax challenge grade out/challenge --out fits/challenge/material
   tissuejax challenge rivals out/challenge --out fits/challenge/material
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
         """What to do, the challenge's folder, and the options of each."""
-        parser.add_argument("action", choices=("make", "run", "judge", "grade", "rivals"), help="what to do")
+        parser.add_argument(
+            "action",
+            choices=("make", "run", "judge", "grade", "rivals"),
+            help="draw sealed cases; diagnose them; judge their evidence again; open the keys; simpler ways",
+        )
         parser.add_argument("folder", type=Path, metavar="FOLDER", help="the challenge")
         parser.add_argument(
             "--kind",
@@ -69,10 +81,13 @@ says what simpler ways of answering would have said on the same cases.
         parser.add_argument("--jobs", "-j", type=int, default=1, metavar="N", help="make, run: processes (default 1)")
         parser.add_argument("--case", action="append", default=[], metavar="NAME", help="run: only this case (repeat)")
         parser.add_argument("--again", action="store_true", help="run: diagnose again what has a result")
+        parser.add_argument(
+            "--number", metavar="PATH=VALUE", help="judge: one of the criteria at another value; nothing is rewritten"
+        )
         parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="grade, rivals: where to write")
 
     def run(self, given: argparse.Namespace) -> Reply:
-        """Do one of the four."""
+        """Do one of the five."""
         positive(given.jobs, "--jobs")
         if given.action == "make":
             which = {"strong": given.strong, "pairs": given.pairs, "rest": given.rest, "aimed": given.aimed}
@@ -97,8 +112,10 @@ says what simpler ways of answering would have said on the same cases.
                 {"results": record}, f"{len(results)} cases answered; next: tissuejax challenge grade {given.folder}"
             )
         if given.action == "judge":
-            said = rejudge(given.folder)
-            return Reply({"verdicts": said}, f"{len(said)} cases judged again from their evidence; next: grade")
+            said = rejudge(given.folder, None if given.number is None else _criteria(given.number))
+            counts = ", ".join(f"{kind} {n}" for kind, n in Counter(said.values()).most_common())
+            after = "next: grade" if given.number is None else f"with {given.number}; nothing was rewritten"
+            return Reply({"verdicts": said}, f"{len(said)} cases judged again from their evidence: {counts}; {after}")
         if given.action == "rivals":
             found = compare(given.folder, given.out, progress=for_terminal())
             return Reply(found, (given.out or given.folder).joinpath("rivals.csv").read_text())
@@ -111,3 +128,14 @@ says what simpler ways of answering would have said on the same cases.
         if (shown := found["channel_f1"])["of"]:
             lines.append(f"  {'channels that show the misfit: F1':<58}{shown['f1']:>6.2f}  (n = {shown['of']})")
         return Reply(found, "\n".join(lines))
+
+
+def _criteria(text: str) -> Criteria:
+    path, _, value = text.partition("=")
+    try:
+        number = float(value)
+    except ValueError as error:
+        raise InputError(f"--number {text}: give one as criteria.coarse=100") from error
+    if not path.startswith("criteria."):
+        raise InputError(f"--number {text}: evidence is judged by the criteria alone; give one as criteria.coarse=100")
+    return Numbers().having(path, number).criteria

@@ -16,8 +16,8 @@ from tissuejax.cache.programs import keep_programs
 from tissuejax.diagnosis import kinds
 from tissuejax.diagnosis.judgement.answer import answer, evidence_file
 from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.judgement.evidence import write_evidence
-from tissuejax.diagnosis.judgement.explore import Effort
 from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.kinds.recorded import Question, Recorded
 from tissuejax.diagnosis.known import known_physics, label
@@ -51,6 +51,7 @@ def diagnose(
     keep: Path | None = None,
     known: Sequence[str] | Mapping[str, float] = (),
     unread: str | Sequence[str] = (),
+    criteria: Criteria | None = None,
 ) -> Diagnosis:
     """What is missing in the model of a sample: the verdict, with everything it rests on.
 
@@ -70,35 +71,22 @@ def diagnose(
             (`Diagnosis.repaired`); what is given is kept, the rest of such an effect is fitted with the base.
         unread: of material tests, recordings that take no part in anything: neither fitted, nor in the noise, nor in
             the choice. They are predicted when all is done (`Diagnosis.unread`).
+        criteria: the numbers that make a verdict; the usual ones by default.
 
     Raises:
         InputError: a file that can't be read, an unknown recording or effect, fewer samples than parameters.
         NotConverged: the base model can't be fitted at all.
     """
     begun = time.perf_counter()
-    jax.config.update("jax_enable_x64", True)
     keep_programs()
     make_room()
     whole = source if isinstance(source, Sample) else read(source)
     sample, unread = without(whole, unread)
-    fitted, held_out, remarks = split(sample, holdout)
-    refuse_unusable(sample, (*fitted, *held_out))
-    refuse_gaps(sample, (*fitted, *held_out))
-    for name in effects or ():
-        if name not in all_effects():
-            raise unknown("effect", name, all_effects())
-    remarks += all_slips(sample, (*fitted, *held_out))
-    kind = experiment(sample.recordings[fitted[0]].experiment).kind
-    stated = [*([e.name for e in energy.effects] if isinstance(energy, Model) else ()), *_items(known)]
-    base = energy.energy if isinstance(energy, Model) else energy
-    base = base if isinstance(base, Energy) else named_energy(base, ogden_form)
-    physics = known_physics(stated, kind)
-    energy = label(energy if isinstance(energy, str) else base.name, physics)
     keep = keep or (None if out is None else Path(out) / "runs")
-    question = Question(sample, base, energy, fitted, held_out, physics, effects, keep)
-    asked = lookup("kind of experiment", kind, members(kinds, Recorded)).of(question)
-    bench = asked.bench
-    bench.warnings += remarks + asked.remarks
+    asked = asked_of(sample, energy, holdout, ogden_form, effects, known, keep, criteria)
+    question, bench = asked.question, asked.bench
+    fitted, energy = question.fitted, question.label
+    bench.warnings += asked.remarks
     if bad := [f"{s.recording} {s.label}" for s in bench.segments if not np.all(np.isfinite(bench.y[s.rows]))]:
         raise InputError(f"{sample.name}: {', '.join(bad)}: values that are not finite; leave these samples out")
     n = sum(len(s.time) for s in bench.segments if s.recording in fitted)
@@ -121,11 +109,11 @@ def diagnose(
         asked.report_to(ran)
         cut, of = asked.left()
         effort = effort or asked.effort
-        every = (*fitted, *held_out)
-        kept = Kept(keep, key(sample, base, physics, every, sorted(bench.candidates), effort, Criteria()))
+        told = (sample, question.energy, question.known, question.every, sorted(bench.candidates), effort)
+        kept = Kept(keep, key(*told, question.criteria))
         if kept.before:
             noted(f"going on: {kept.before} sets were weighed before it was stopped")
-        found = answer(bench, asked.whole, cut, of, effort, noted, kept=kept)
+        found = answer(bench, asked.whole, cut, of, effort, noted, question.criteria, kept)
         made = asked.finished(found)
         made.unread = asked.predicted(whole, unread, found) if unread else {}
     if found.evidence.exhausted:
@@ -144,6 +132,41 @@ def diagnose(
         write_evidence(found.evidence, evidence_file(Path(out)))
     kept.forget()
     return made
+
+
+def asked_of(
+    sample: Sample,
+    energy: str | Energy | Model,
+    holdout: str | Sequence[str] | None = None,
+    ogden_form: str | None = None,
+    effects: Sequence[str] | None = None,
+    known: Sequence[str] | Mapping[str, float] = (),
+    keep: Path | None = None,
+    criteria: Criteria | None = None,
+) -> Recorded:
+    """The question that a diagnosis asks of a sample, on its bench: nothing is fitted yet. See `diagnose`.
+
+    Raises:
+        InputError: recordings that can't be used, an unknown recording or effect.
+    """
+    jax.config.update("jax_enable_x64", True)
+    fitted, held_out, remarks = split(sample, holdout)
+    refuse_unusable(sample, (*fitted, *held_out))
+    refuse_gaps(sample, (*fitted, *held_out))
+    for name in effects or ():
+        if name not in all_effects():
+            raise unknown("effect", name, all_effects())
+    remarks += all_slips(sample, (*fitted, *held_out))
+    kind = experiment(sample.recordings[fitted[0]].experiment).kind
+    stated = [*([e.name for e in energy.effects] if isinstance(energy, Model) else ()), *_items(known)]
+    base = energy.energy if isinstance(energy, Model) else energy
+    base = base if isinstance(base, Energy) else named_energy(base, ogden_form)
+    physics = known_physics(stated, kind)
+    said = label(energy if isinstance(energy, str) else base.name, physics)
+    question = Question(sample, base, said, fitted, held_out, physics, effects, keep, criteria or Criteria())
+    asked = lookup("kind of experiment", kind, members(kinds, Recorded)).of(question)
+    asked.remarks = remarks + asked.remarks
+    return asked
 
 
 def without(sample: Sample, unread: str | Sequence[str]) -> tuple[Sample, tuple[str, ...]]:

@@ -12,17 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tissuejax.diagnosis.bench import Candidate
+from tissuejax.diagnosis.judgement.particular import SHOWN, Shown
 from tissuejax.diagnosis.untimed import without_clock, without_pace
 from tissuejax.effects.catalogue import effects
 from tissuejax.recordings.recording import Recording, Sample
-
-BACK = 0.05  # of the range of stretch: less of a way back is no unloading
-STILL = 0.05  # of the quickest rate: slower is a hold
-RATES = 1.5  # ratio from which two rates are two
-NEAR = 0.05  # of the largest strain: strains closer than this are one
-SHARED = 0.5  # of a recording's samples
-FIBRE_POINTS = 200  # of a recording's path that are compared
-HELD = 0.05  # of a recording's time: a shorter hold is none
 
 
 @dataclass(frozen=True)
@@ -65,11 +58,11 @@ class Protocol:
         return len(self.kinds) > 1 or self.sides or self.sizes
 
     @classmethod
-    def of(cls, sample: Sample) -> "Protocol":
+    def of(cls, sample: Sample, shown: Shown = SHOWN) -> "Protocol":
         """The protocol of a sample of material tests."""
         recordings = list(sample.recordings.values())
         drives = [d for r in recordings for d in driven(r)]
-        moves = [motion(t, x) for t, x in drives]
+        moves = [motion(t, x, shown) for t, x in drives]
         quick = [m[1] for m in moves if m[1] > 0]
         directions = {direction(r) for r in recordings}
         kinds = frozenset(r.experiment for r in recordings)
@@ -77,12 +70,14 @@ class Protocol:
         return cls(
             kinds=kinds,
             reversed=back,
-            rates=back or any(m[2] for m in moves) or (bool(quick) and max(quick) > RATES * min(quick)),
+            rates=back or any(m[2] for m in moves) or (bool(quick) and max(quick) > shown.rates * min(quick)),
             times=len({float(r.attributes.get("start", 0.0)) for r in recordings}) > 1,
             directions=len(directions) > 1 or "biaxial" in kinds,
-            sides=any(np.min(x) < -1e-3 for _, x in drives) and any(np.max(x) > 1e-3 for _, x in drives),
+            sides=all(any(np.max(sign * x) > shown.sides for _, x in drives) for sign in (-1, 1)),
             sizes=len({(r.attributes.get("area"), r.attributes.get("height")) for r in recordings}) > 1,
-            repeated=any(overlap(a, b) > SHARED for a, b in itertools.permutations(recordings, 2) if alike(a, b)),
+            repeated=any(
+                overlap(a, b, shown) > shown.shared for a, b in itertools.permutations(recordings, 2) if alike(a, b)
+            ),
         )
 
 
@@ -97,11 +92,11 @@ def alike(a: Recording, b: Recording) -> bool:
     return (a.experiment, direction(a)) == (b.experiment, direction(b)) and abs(axial[0] - axial[1]) < 1e-6
 
 
-def overlap(a: Recording, b: Recording) -> float:
+def overlap(a: Recording, b: Recording, shown: Shown = SHOWN) -> float:
     """Share of the samples of `a`, those near rest left out, whose strain `b` passes too."""
     one, other = (np.stack([x for _, x in driven(r)], axis=1) for r in (a, b))
-    one, other = (x[np.unique(np.linspace(0, len(x) - 1, FIBRE_POINTS).astype(int))] for x in (one, other))
-    near = NEAR * float(np.max(np.abs(np.concatenate([one, other]))))
+    one, other = (x[np.unique(np.linspace(0, len(x) - 1, shown.points).astype(int))] for x in (one, other))
+    near = shown.near * float(np.max(np.abs(np.concatenate([one, other]))))
     one = one[np.linalg.norm(one, axis=1) > near]
     apart = np.min(np.linalg.norm(one[:, None] - other[None], axis=-1), axis=1) if len(one) else np.zeros(0)
     return float(np.mean(apart <= near)) if len(apart) else 0.0
@@ -117,21 +112,23 @@ def driven(r: Recording) -> list[tuple[np.ndarray, np.ndarray]]:
     ]
 
 
-def motion(time: np.ndarray, x: np.ndarray) -> tuple[bool, float, bool]:
+def motion(time: np.ndarray, x: np.ndarray, shown: Shown = SHOWN) -> tuple[bool, float, bool]:
     """Whether it comes back, its quickest sustained rate, and whether it is held."""
     span = float(np.ptp(x)) or 1.0
     back = max(float(np.max(np.maximum.accumulate(side) - side)) for side in (x, -x))
     way = max(float(np.max(side) - side[0]) for side in (x, -x))
-    turns = min(back, way) > BACK * span and float(np.sum(np.abs(np.diff(x)))) > (1 + 2 * BACK) * abs(x[-1] - x[0])
+    turns = min(back, way) > shown.back * span and float(np.sum(np.abs(np.diff(x)))) > (1 + 2 * shown.back) * abs(
+        x[-1] - x[0]
+    )
     rate = np.abs(np.diff(x)) / np.maximum(np.diff(time), 1e-12)
-    quick = float(np.quantile(rate, 0.9)) if len(rate) else 0.0
-    still = float(np.sum(np.diff(time)[rate < STILL * float(np.max(rate, initial=0.0))]))
-    return turns, quick, still > HELD * float(np.ptp(time))
+    quick = float(np.quantile(rate, shown.quick)) if len(rate) else 0.0
+    still = float(np.sum(np.diff(time)[rate < shown.still * float(np.max(rate, initial=0.0))]))
+    return turns, quick, still > shown.held * float(np.ptp(time))
 
 
-def paced(sample: Sample) -> bool:
+def paced(sample: Sample, shown: Shown = SHOWN) -> bool:
     """Whether time was recorded and is more than a function of the strain: several rates, or holds."""
-    return sample.timed and Protocol.of(sample).rates
+    return sample.timed and Protocol.of(sample, shown).rates
 
 
 LACKING: Mapping[str, str] = {  # property of a protocol: what is said where it is not there
@@ -151,21 +148,25 @@ def needs() -> dict[str, str]:
 
 
 def offered(
-    sample: Sample, candidates: Mapping[str, Candidate], names: Sequence[str] | None = None
+    sample: Sample,
+    candidates: Mapping[str, Candidate],
+    names: Sequence[str] | None = None,
+    shown: Shown = SHOWN,
 ) -> tuple[dict[str, Candidate], list[str]]:
     """Candidates that the sample's recordings can show, and remarks on what was left out.
 
     Args:
         names: effects asked for; all by default.
+        shown: from when on a protocol shows something.
     """
     kept, remarks = dict(candidates), []
     if not sample.timed:
         kept = without_clock(kept)
         remarks.append("no time was recorded: effects that act in time (relaxation, drift, aging) were not tried")
-    protocol = Protocol.of(sample)
+    protocol = Protocol.of(sample, shown)
     if not protocol.rates:
         kept = without_pace(kept)
-    kept, left_out = shown(widened(kept, protocol, names), protocol, needs(), LACKING)
+    kept, left_out = speaking(widened(kept, protocol, names), protocol, needs(), LACKING)
     return kept, remarks + left_out
 
 
@@ -188,7 +189,7 @@ def widened(
     return {k: c for k, c in candidates.items() if not c.widens} | {k: own[k] for k in order}
 
 
-def shown(
+def speaking(
     candidates: Mapping[str, Candidate], protocol: object, asked: Mapping[str, str], lacking: Mapping[str, str]
 ) -> tuple[dict[str, Candidate], list[str]]:
     """Candidates that a protocol can show, and remarks on the others.

@@ -13,9 +13,8 @@ from jaxtyping import Bool, Float
 
 from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.probing_view import ProbingView
-from tissuejax.estimation.discrepancy import ALIKE, LAW, SLOW, STATES, Part, loading_states, smooth_factor
-
-TOUCHING = 0.05  # of the depth: where a shift of the surface is no small part of it
+from tissuejax.estimation.discrepancy import Part, loading_states, smooth_factor
+from tissuejax.estimation.smoothness import USUAL, Smoothness
 
 
 @dataclass(frozen=True)
@@ -55,7 +54,7 @@ class ProbingDiscrepancy:
         return (*shaped, *self.fixed)
 
 
-def probing_discrepancy(view: ProbingView, cut: Blocks) -> ProbingDiscrepancy:
+def probing_discrepancy(view: ProbingView, cut: Blocks, smooth: Smoothness = USUAL) -> ProbingDiscrepancy:
     """The discrepancy of probings, in the families of material tests and one of each marker's own.
 
     Law: smooth in depth times the prediction, common to all recordings. Gain, own law: of each recording's own. Onset:
@@ -68,23 +67,25 @@ def probing_discrepancy(view: ProbingView, cut: Blocks) -> ProbingDiscrepancy:
     where it was registered. Crosstalk: a share of the vertical force in a lateral one, as load cells of several axes
     have it, and meshes that are not symmetric.
     """
-    segments = view.segments
+    segments, numbers = view.segments, view.numbers
     rows = [np.flatnonzero(cut.owner == k) for k in range(len(segments))]
     depth, time = cut.mean(_joined(view, "drive")), cut.mean(_joined(view, "time"))
     span = float(np.ptp(depth)) or 1.0
     channel = np.array([segments[k].channel for k in cut.owner])
     recording = np.array([segments[k].recording for k in cut.owner])
-    grid = np.linspace(depth.min(), depth.max(), 60)
+    grid = np.linspace(depth.min(), depth.max(), numbers.knots)
 
     def smooth_in_depth(length: float) -> Float[np.ndarray, "M r"]:
         known = smooth_factor(grid[:, None], length)
         return np.stack([np.interp(depth, grid, f) for f in known.T], axis=1)
 
-    wide, fine, alike = (smooth_in_depth(length) for length in (LAW["law"], LAW["fine law"], ALIKE))
-    states = np.zeros((len(cut.starts), len(STATES)))
+    wide, fine, alike = (
+        smooth_in_depth(length) for length in (smooth.law["law"], smooth.law["fine law"], smooth.turning)
+    )
+    states = np.zeros((len(cut.starts), len(smooth.states)))
     for k, s in enumerate(segments):
         own = Blocks(cut.starts[rows[k]] - s.rows.start, cut.counts[rows[k]], np.zeros(0, int))
-        states[rows[k]] = own.mean(loading_states(s.drive))
+        states[rows[k]] = own.mean(loading_states(s.drive, smooth))
     shaped, fixed = [], []
     for c in dict.fromkeys(channel.tolist()):
         inside = (channel == c)[:, None]
@@ -95,12 +96,12 @@ def probing_discrepancy(view: ProbingView, cut: Blocks) -> ProbingDiscrepancy:
         shaped.append((f"gain{of}", gain, np.concatenate(each, axis=1).astype(float)))
         shaped.append((f"own law{of}", gain, np.concatenate([wide * e for e in each], axis=1)))
         if c == "force":
-            onset = 1.5 * span / (np.maximum(depth, 0.0) + TOUCHING * span)  # of a ball on an elastic body, n = 3/2
+            onset = numbers.steep * span / (np.maximum(depth, 0.0) + numbers.touching * span)
             shaped.append(("onset", "onset", np.concatenate([onset[:, None] * e for e in each], axis=1)))
             shaped.append(("fine law", "law", fine * inside))
-            for i, shape in enumerate(STATES):
+            for i, shape in enumerate(smooth.states):
                 shaped.append((f"hysteresis, {shape}", "hysteresis", alike * inside * states[:, i, None]))
-        for name, share in SLOW.items():
+        for name, share in smooth.slow.items():
             if c == "force" or name == "lasting":
                 fixed.append(Part(f"{name}{of}", "slow", within=_within(rows, inside, _wander(time, share))))
         sigma = cut.spread(view.sigma)
@@ -111,7 +112,7 @@ def probing_discrepancy(view: ProbingView, cut: Blocks) -> ProbingDiscrepancy:
         moved = cut.mean(travel)
 
         def marker(o: np.ndarray) -> np.ndarray:
-            near = np.exp(-0.5 * ((depth[o][:, None] - depth[o]) / span / LAW["law"]) ** 2)
+            near = np.exp(-0.5 * ((depth[o][:, None] - depth[o]) / span / smooth.law["law"]) ** 2)
             return near * np.outer(moved[o], moved[o])
 
         fixed.append(Part("marker", "marker", within=_within(rows, (channel == "markers")[:, None], marker)))

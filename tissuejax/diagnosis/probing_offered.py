@@ -6,11 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tissuejax.diagnosis.bench import Candidate
-from tissuejax.diagnosis.offered import motion, shown, widened
+from tissuejax.diagnosis.judgement.particular import SHOWN, Shown
+from tissuejax.diagnosis.offered import motion, speaking, widened
 from tissuejax.effects.catalogue import effects
 from tissuejax.estimation.series import Segment
-
-ENOUGH = 20  # of the force: four in each of five periods, so that a hum has a range of frequencies to lie in
 
 
 @dataclass(frozen=True)
@@ -30,14 +29,14 @@ class Pressed:
     sampled: bool
 
     @classmethod
-    def of(cls, segments: Sequence[Segment]) -> "Pressed":
+    def of(cls, segments: Sequence[Segment], shown: Shown = SHOWN) -> "Pressed":
         """Of the series of a bench, whose drive is the depth."""
         forces = [s for s in segments if s.channel == "force"]
         deep = [s for s in forces if float(np.ptp(s.drive)) > 0]
         return cls(
             several=len({s.recording for s in deep}) > 1,
-            reversed=any(motion(np.asarray(s.time), np.asarray(s.drive))[0] for s in deep),
-            sampled=max((len(s.time) for s in forces), default=0) >= ENOUGH,
+            reversed=any(motion(np.asarray(s.time), np.asarray(s.drive), shown)[0] for s in deep),
+            sampled=max((len(s.time) for s in forces), default=0) >= shown.readings,
         )
 
 
@@ -54,12 +53,16 @@ def asked() -> dict[str, str]:
 
 
 def pressed(
-    segments: Sequence[Segment], candidates: Mapping[str, Candidate], names: Sequence[str] | None = None
+    segments: Sequence[Segment],
+    candidates: Mapping[str, Candidate],
+    names: Sequence[str] | None = None,
+    shown: Shown = SHOWN,
 ) -> tuple[dict[str, Candidate], list[str]]:
     """Candidates that probings can show, and remarks on what was left out.
 
     Args:
         names: effects asked for; all by default.
+        shown: from when on a protocol shows something.
     """
-    protocol = Pressed.of(segments)
-    return shown(widened(candidates, protocol, names), protocol, asked(), WITHOUT)
+    protocol = Pressed.of(segments, shown)
+    return speaking(widened(candidates, protocol, names), protocol, asked(), WITHOUT)

@@ -15,8 +15,6 @@ from jaxtyping import Float
 
 from tissuejax.diagnosis.bench import Free
 
-SHAPE = 0.25  # of a shape's logarithm, its scale, or an amplitude's size: what its own effect may have moved
-
 
 @dataclass(frozen=True)
 class Slope:
@@ -53,16 +51,18 @@ class Slopes:
         recordings: Sequence[str],
         change,
         reach: float,
+        shape: float,
     ) -> Float[np.ndarray, " N"] | None:
         """The column taken nearest to `values`, if one is near enough.
 
         Args:
             change: of a prediction, its relative difference from that at `values`.
             reach: largest such difference.
+            shape: see `Simulated.shape`.
         """
         near = []
         for slope in self.taken.get(path, ()):
-            if slope.recordings.issuperset(recordings) and _alike(path, values, slope.values, free):
+            if slope.recordings.issuperset(recordings) and _alike(path, values, slope.values, free, shape):
                 near.append((change(slope.prediction), slope))
         if not near or min(near, key=lambda n: n[0])[0] > reach:
             return None
@@ -70,7 +70,9 @@ class Slopes:
         return slope.column * (slope.values[path] / values[path] if free[path].log else 1.0)
 
 
-def _alike(path: str, one: Mapping[str, float], other: Mapping[str, float], free: Mapping[str, Free]) -> bool:
+def _alike(
+    path: str, one: Mapping[str, float], other: Mapping[str, float], free: Mapping[str, Free], shape: float
+) -> bool:
     """Whether what the same effect does is much the same at both; an amplitude's own value doesn't count."""
     if not path.startswith("effects."):
         return True
@@ -80,6 +82,6 @@ def _alike(path: str, one: Mapping[str, float], other: Mapping[str, float], free
         if f is None or a == b:
             continue
         moved = abs(np.log(a / b)) if f.log and a > 0 and b > 0 else abs(a - b) / max(f.scale, abs(a), abs(b))
-        if moved > SHAPE:
+        if moved > shape:
             return False
     return True

@@ -11,10 +11,11 @@ still errs by its speed. Tissue that is moved faster than life is held back by d
 and unloading too soft, as if the measurement came late, and a late clock or a tissue that remembers would be named for
 it. By how much, of each channel of each recording, is read from slow - coarse by least squares; what else the two
 differ in is ringing, another one at each speed. An error of first order in the speed (damping) is as large again as
-that difference, one of second order (inertia) a third of it: `LEFT` takes the middle, `EITHER` the half way to both.
+that difference, one of second order (inertia) a third of it: `Simulated.late` takes the middle, `Simulated.open` the
+half way to both.
 
 A fit is anchored anew where it came to rest. What is left open is the known part of the discrepancy: of the mesh, of
-order two, `REMAINS` of the change from coarse to fine; of the speed `EITHER` of slow - coarse.
+order two, `Simulated.remains` of the change from coarse to fine; of the speed `Simulated.open` of slow - coarse.
 
 A column of the Jacobian is a simulation of every recording too: those of the base's fit nominate effects, and a descent
 takes those it finds nearby (`probing_slopes`).
@@ -33,23 +34,12 @@ from scipy.ndimage import gaussian_filter1d
 
 from tissuejax.diagnosis.bench import Bench, Candidate
 from tissuejax.diagnosis.judgement.blocks import Blocks, blocks
+from tissuejax.diagnosis.judgement.particular import MEANS, SIMULATED, Simulated
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_added import added, is_added
 from tissuejax.diagnosis.probing_runs import COARSE, FINE, RETIMED
 from tissuejax.diagnosis.probing_slopes import Slope
 from tissuejax.experiments.probing_sensors import FEWEST
-
-BLOCKS = {"force": 80, "markers": 16}  # block means of a series: markers are many and calm
-REACH, SHARP = 0.03, 0.01  # relative change of the prediction up to which a derivative is taken from nearby
-# the same for the correction: while the base is fitted; and about it, where one correction for all sets leaves its own
-# errors (meshes ring, a few nats' worth) out of their comparison
-STAYS, COMMON = 0.03, 0.15
-# from where on it says nothing: in p03 a support that moves, its inertia at twice the speed uncorrected, drove moduli
-# to twice their size (change 0.85; a late clock 0.05)
-FAR = 0.4
-REMAINS = 0.48  # mesh of 12 x 12 x 5 to 22 x 22 x 8 elements, 1.75 times finer: 1 / (1.75^2 - 1)
-CALMED = 3.0  # samples over which a rate is smoothed, so that it doesn't ring
-LEFT, EITHER = 2 / 3, 1 / 3  # of the change from twice the speed: 1 / (2^p - 1) for order p = 1 and 2
 
 
 class ProbingView(Bench):
@@ -57,6 +47,7 @@ class ProbingView(Bench):
 
     Attributes beyond those of `Bench`:
         source: the probings in SI units.
+        numbers: see `Simulated`.
         origin, unit: of each row: a marker's place at rest, and the largest force or displacement.
         shift: correction of the coarse simulation, SI; `place`: what that simulation predicts where it was taken; None
             before.
@@ -67,16 +58,20 @@ class ProbingView(Bench):
     costly: ClassVar[bool] = True
 
     @classmethod
-    def of(cls, source: ProbingBench) -> "ProbingView":
-        """The view of probings, not anchored yet: predictions are those of the coarse simulation."""
+    def of(cls, source: ProbingBench, numbers: Simulated = SIMULATED, peak: float = MEANS.peak) -> "ProbingView":
+        """The view of probings, not anchored yet: predictions are those of the coarse simulation.
+
+        Args:
+            peak: quantile of a channel's size that is its unit.
+        """
         origin, unit = np.zeros(len(source.y)), np.ones(len(source.y))
         for s in source.segments:
             if s.channel == "markers":
-                early = source.y[s.rows][: max(len(s.time) // 10, 5)]
+                early = source.y[s.rows][: max(len(s.time) // numbers.early, numbers.fewest)]
                 origin[s.rows] = np.median(early)
         for channel in dict.fromkeys(s.channel for s in source.segments):
             own = [s for s in source.segments if s.channel == channel]
-            largest = max(float(np.quantile(np.abs((source.y - origin)[s.rows]), 0.98)) for s in own)
+            largest = max(float(np.quantile(np.abs((source.y - origin)[s.rows]), peak)) for s in own)
             for s in own:
                 unit[s.rows] = largest or 1.0
         made = cls(
@@ -93,7 +88,7 @@ class ProbingView(Bench):
         )
         made.source, made.origin, made.unit = source, origin, unit
         made.shift, made._open, made.place = np.zeros(len(source.y)), None, None
-        made.root, made.reach, made.stays = None, REACH, STAYS
+        made.numbers, made.root, made.reach, made.stays = numbers, None, numbers.reach, numbers.stays
         return made
 
     @property
@@ -129,10 +124,10 @@ class ProbingView(Bench):
         fine, slow, coarse = self.source.runs.many([(at, names, k) for k in (FINE, RETIMED, COARSE)])
         made = copy.copy(self)
         late = self._held_back(slow, coarse)
-        made.shift, made.place = fine - coarse + LEFT * late, coarse
+        made.shift, made.place = fine - coarse + self.numbers.late * late, coarse
         made._open = {
-            "mesh": self._errors(REMAINS * self.source.calmed(fine - slow) / self.unit),
-            "speed": self._errors(EITHER * late / self.unit),
+            "mesh": self._errors(self.numbers.remains * self.source.calmed(fine - slow) / self.unit),
+            "speed": self._errors(self.numbers.open * late / self.unit),
             "ringing": self._ringing(slow - coarse) / self.unit,
         }
         return made
@@ -140,7 +135,7 @@ class ProbingView(Bench):
     def nearer(self, values: Mapping[str, float]) -> "ProbingView":
         """See `Bench.nearer`."""
         near = copy.copy(self)
-        near.stays = FAR
+        near.stays = self.numbers.far
         made = near.anchored(values)
         made.stays = self.stays
         return made
@@ -149,7 +144,7 @@ class ProbingView(Bench):
         """The part of slow - coarse that is as if each channel of a recording came late."""
         rate, out = np.zeros(len(slow)), np.zeros(len(slow))
         for s in self.segments:
-            rate[s.rows] = gaussian_filter1d(np.gradient(slow[s.rows], s.time), CALMED)
+            rate[s.rows] = gaussian_filter1d(np.gradient(slow[s.rows], s.time), self.numbers.calmed)
         for pair in dict.fromkeys((s.recording, s.channel) for s in self.segments):
             rows = np.concatenate([np.r_[s.rows] for s in self.segments if (s.recording, s.channel) == pair])
             r, size = rate[rows], float(rate[rows] @ rate[rows])
@@ -163,7 +158,7 @@ class ProbingView(Bench):
         """
         out, rings = np.zeros(len(difference)), difference - self.source.calmed(difference)
         for s in self.segments:
-            out[s.rows] = np.sqrt(gaussian_filter1d(np.nan_to_num(rings[s.rows]) ** 2, CALMED))
+            out[s.rows] = np.sqrt(gaussian_filter1d(np.nan_to_num(rings[s.rows]) ** 2, self.numbers.calmed))
         return out
 
     @property
@@ -192,13 +187,13 @@ class ProbingView(Bench):
     def rooted(self, values: Mapping[str, float]) -> "ProbingView":
         """See `Bench.rooted`."""
         made = copy.copy(self)
-        made.root, made.stays = self.source.at({p: v for p, v in values.items() if p in self.free}), COMMON
+        made.root, made.stays = self.source.at({p: v for p, v in values.items() if p in self.free}), self.numbers.common
         return made
 
     def sharpened(self) -> "ProbingView":
         """See `Bench.sharpened`."""
         made = copy.copy(self)
-        made.reach = SHARP
+        made.reach = self.numbers.sharp
         return made
 
     def jacobian(
@@ -243,7 +238,7 @@ class ProbingView(Bench):
         def change(other: Float[np.ndarray, " N"]) -> float:
             return self._change(coarse_run, other, wanted)
 
-        return self.source.slopes_taken.find(path, at, self.free, wanted, change, reach)
+        return self.source.slopes_taken.find(path, at, self.free, wanted, change, reach, self.numbers.shape)
 
     def _kept(self, path, at, wanted, column) -> Float[np.ndarray, " N"]:
         coarse_run = self.source.runs.many([(at, wanted, COARSE)])[0]
@@ -290,4 +285,4 @@ class ProbingView(Bench):
 
 def probing_blocks(view: ProbingView) -> Blocks:
     """Block means of forces and markers."""
-    return blocks(view, BLOCKS)
+    return blocks(view, view.numbers.means)

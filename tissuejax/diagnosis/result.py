@@ -121,7 +121,7 @@ class Diagnosis:
             return []
         return [
             {"effects": list(s.names), "forms": list(s.keys), "probability": p, "log_evidence": s.log_evidence}
-            for s, p in covering(a.judgement)
+            for s, p in covering(a.judgement, a.exploration.criteria)
         ]
 
     def candidates(self) -> list[dict]:

@@ -8,8 +8,6 @@ import numpy as np
 from tissuejax.diagnosis.bench import Bench, Candidate
 from tissuejax.diagnosis.score import Score
 
-SHORT = 4  # settings of a shape that are all tried where nothing is named yet
-
 
 def inside(
     bench: Bench, candidate: Candidate, step: Mapping[str, float], setting: Mapping[str, float], values: Mapping
@@ -27,16 +25,16 @@ def inside(
     return out
 
 
-def distinct(score: Score, most: int, whole: bool = False) -> list[tuple[float, dict, dict]]:
-    """The best settings whose gains are worth a start of their own; all of a short list if `whole`.
+def distinct(score: Score, most: int, worthwhile: float, short: int) -> list[tuple[float, dict, dict]]:
+    """The best settings whose gains are `worthwhile` beside the best one's; all of a list no longer than `short`.
 
     A linear step ranks directions of strong fibres badly: those that it sees first shorten and go slack.
     """
-    if whole and len(score.settings) <= SHORT:
+    if len(score.settings) <= short:
         return list(score.settings)
     kept = list(score.settings[:1])
     for trial in score.settings[1:]:
-        if len(kept) >= most or trial[0] < 0.5 * kept[0][0]:
+        if len(kept) >= most or trial[0] < worthwhile * kept[0][0]:
             break
         kept.append(trial)
     return kept

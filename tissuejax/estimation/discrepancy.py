@@ -20,7 +20,7 @@ the model of Kennedy and O'Hagan (2001), with the parts that rests of material t
 Amplitudes a_k are shares of the stress that the model predicts (law, gain, waning gain), of its peak in the recording
 (hysteresis), or of the measured peak there (slow, white). Of what the model predicts: about the stress of another model
 a gain could bring that model's answer in, and about the measured peak a part that all specimens share would carry how
-they differ.
+they differ. Lengths and times are those of `Smoothness`.
 
 Source: Kennedy and O'Hagan 2001, J. R. Statist. Soc. B 63; the loading state: Krasnosel'skii and Pokrovskii 1989.
 """
@@ -31,16 +31,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from tissuejax.estimation.smoothness import USUAL, Smoothness
 from tissuejax.estimation.sudden import Moment, Timed
 
-LAW = {"law": 0.5, "fine law": 0.12}  # correlation lengths, of the range of strain
-ALIKE = 0.4  # correlation length of hysteresis, of the range of strain
-STATES = {"step": 0.01, "narrow": 0.06, "wide": 0.3}  # path over which the loading state turns, of the range
-SLOW = {"quick": 0.05, "slow": 0.25, "lasting": 1.5}  # correlation times, of a recording's duration
-BEGUN = 0.01  # of a recording's duration: up to there time is counted, beyond it its logarithm
-WANING = 0.5  # correlation time of a gain, of a recording's duration
 LEFT_OUT = 1e-5  # of the largest eigenvalue: what smooth parts are cut off at
-BAND = 0.005  # of the range: a drive that trembles by less has not turned round
 
 
 @dataclass(frozen=True)
@@ -60,7 +54,7 @@ class Series:
     mode: Hashable
     time: Float[np.ndarray, " n"]
     strain: Float[np.ndarray, "n k"]
-    states: Float[np.ndarray, "n 3"]
+    states: Float[np.ndarray, "n w"]
     peak: float
 
 
@@ -78,25 +72,24 @@ class Part:
     name: str
     family: str
     factor: Float[np.ndarray, "N r"] | None = None
-    within: tuple[Float[np.ndarray, "n n"], ...] | None = None
+    within: tuple[Float[np.ndarray, "_ _"], ...] | None = None
 
 
-def loading_states(strain: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
-    """Where a series is between loading (1) and unloading (-1), in the shapes of `STATES`; 0 before it has moved.
+def loading_states(strain: Float[np.ndarray, " n"], smooth: Smoothness = USUAL) -> Float[np.ndarray, "n w"]:
+    """Where a series is between loading (1) and unloading (-1), in each of `Smoothness.states`; 0 before it has moved.
 
     h' = |x'| (sign x' - h) / w along the path, w a share of the range: it depends on the order of strains alone, not
-    on their rate (a play operator takes out what trembles by less than `BAND`).
+    on their rate (a play operator takes out what trembles by less than `Smoothness.band`).
     """
     span = float(np.ptp(strain)) or 1.0
-    band, played = BAND * span, np.empty(len(strain))
+    band, played = smooth.band * span, np.empty(len(strain))
     at = float(strain[0])
     for i, x in enumerate(strain.tolist()):
         at = min(max(at, x - band), x + band)
         played[i] = at
     step = np.diff(played, prepend=played[0]) / span
-    out = np.zeros((len(strain), len(STATES)))
-    h = np.zeros(len(STATES))
-    widths = np.array(list(STATES.values()))
+    widths = np.array(list(smooth.states.values()))
+    out, h = np.zeros((len(strain), len(widths))), np.zeros(len(widths))
     for i in np.flatnonzero(step):
         h = np.sign(step[i]) + (h - np.sign(step[i])) * np.exp(-abs(step[i]) / widths)
         out[i] = h
@@ -104,7 +97,7 @@ def loading_states(strain: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
     return np.where(last[:, None] >= 0, out[np.maximum(last, 0)], 0.0)
 
 
-def turned(states: Float[np.ndarray, "n 3"]) -> bool:
+def turned(states: Float[np.ndarray, "n w"]) -> bool:
     """Whether a series turned round: its narrowest state has come to either side."""
     return bool(np.min(states[:, 0]) < 0 < np.max(states[:, 0]))
 
@@ -118,10 +111,10 @@ def smooth_factor(x: Float[np.ndarray, "n k"], length: float) -> Float[np.ndarra
     return vectors[:, kept] * np.sqrt(values[kept])
 
 
-def _passed(time: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+def _passed(time: Float[np.ndarray, " n"], begun: float) -> Float[np.ndarray, " n"]:
     """Time since the first sample on a scale of its logarithm, from 0 to 1."""
     elapsed = (time - time[0]) / (float(np.ptp(time)) or 1.0)
-    return np.log1p(elapsed / BEGUN) / np.log1p(1 / BEGUN)
+    return np.log1p(elapsed / begun) / np.log1p(1 / begun)
 
 
 @dataclass(frozen=True)
@@ -151,12 +144,12 @@ class Discrepancy:
         sudden: what may have happened at once.
     """
 
-    laws: tuple[tuple[str, Float[np.ndarray, "N r"]], ...]
+    laws: tuple[tuple[str, Float[np.ndarray, "N _"]], ...]
     belongs: Float[np.ndarray, "N R"]
     own: Float[np.ndarray, "N q"]
     turning: tuple[Part, ...]
     fixed: tuple[Part, ...]
-    fading: tuple[Float[np.ndarray, "n n"], ...]
+    fading: tuple[Float[np.ndarray, "_ _"], ...]
     nearly: Float[np.ndarray, "N e"]
     in_time: Float[np.ndarray, "N f"]
     timed: Timed | None = None
@@ -189,7 +182,11 @@ class Discrepancy:
 
 
 def discrepancy(
-    series: Sequence[Series], sigma: Float[np.ndarray, " N"], paced: bool = False, at_once: bool = False
+    series: Sequence[Series],
+    sigma: Float[np.ndarray, " N"],
+    paced: bool = False,
+    at_once: bool = False,
+    smooth: Smoothness = USUAL,
 ) -> Discrepancy:
     """The discrepancy of these series, stacked in their order.
 
@@ -198,6 +195,7 @@ def discrepancy(
         paced: whether time is more than a function of the strain: else a gain that wanes is a law of each recording's
             own, and that part is left out, and what an effect's law errs by is smooth in strain alone.
         at_once: whether what happens at once is looked for.
+        smooth: lengths and times; of the series' loading states too.
     """
     of = np.repeat(np.arange(len(series)), [len(s.time) for s in series])
     states = np.concatenate([s.states for s in series])
@@ -210,7 +208,7 @@ def discrepancy(
             members = np.array([i for i, other in enumerate(labels) if other == label])
             x = np.concatenate([series[i].strain for i in members])
             if timed:
-                passed = np.concatenate([_passed(series[i].time) for i in members])
+                passed = np.concatenate([_passed(series[i].time, smooth.begun) for i in members])
                 x = np.column_stack([x / (float(np.max(np.ptp(x, axis=0))) or 1.0), passed])
             own = smooth_factor(x, length)
             whole = np.zeros((len(of), own.shape[1]))
@@ -221,12 +219,12 @@ def discrepancy(
     recordings = list(dict.fromkeys(s.recording for s in series))
     belongs = np.array([recordings.index(s.recording) for s in series])[of]
     modes = [s.mode for s in series]
-    near, out = shared(ALIKE, modes), []
+    near, out = shared(smooth.turning, modes), []
     kind = "hysteresis" if any(turned(s.states) for s in series) else "added law"
-    turning = tuple(Part(f"{kind}, {shape}", kind, near * states[:, i, None]) for i, shape in enumerate(STATES))
+    turning = tuple(Part(f"{kind}, {shape}", kind, near * states[:, i, None]) for i, shape in enumerate(smooth.states))
     shares = [s.time / (float(np.ptp(s.time)) or 1.0) for s in series]
     apart = [np.abs(elapsed[:, None] - elapsed) for elapsed in shares]  # of the recording's duration
-    for name, time in SLOW.items():
+    for name, time in smooth.slow.items():
         alike = (s.peak**2 * np.exp(-d / time) for s, d in zip(series, apart, strict=True))
         out.append(Part(name, "slow", within=tuple(alike)))
     scatter = []
@@ -234,9 +232,9 @@ def discrepancy(
         own = sigma[of == i]
         scatter.append(np.diag((s.peak * own / max(float(np.median(own)), 1e-300)) ** 2))
     out.append(Part("white", "white", within=tuple(scatter)))
-    laws = tuple((name, shared(length, modes)) for name, length in LAW.items())
+    laws = tuple((name, shared(length, modes)) for name, length in smooth.law.items())
     several = {m for m in modes if len({s.recording for s in series if s.mode == m}) > 1}
-    own = shared(LAW["law"], [(s.recording, s.mode) if s.mode in several else None for s in series])
+    own = shared(smooth.law["law"], [(s.recording, s.mode) if s.mode in several else None for s in series])
     belongs_to = (belongs[:, None] == np.arange(len(recordings))).astype(float)
     return Discrepancy(
         laws,
@@ -244,8 +242,8 @@ def discrepancy(
         own,
         turning,
         tuple(out),
-        tuple(np.exp(-d / WANING) for d in apart if paced),
-        np.concatenate([shared(LAW["law"], modes), belongs_to], axis=1),
-        np.concatenate([shared(LAW["law"], modes, timed=paced), belongs_to], axis=1),
-        Timed(np.concatenate([s.time for s in series]), of, np.argmax(belongs_to, axis=1)) if at_once else None,
+        tuple(np.exp(-d / smooth.waning) for d in apart if paced),
+        np.concatenate([shared(smooth.law["law"], modes), belongs_to], axis=1),
+        np.concatenate([shared(smooth.law["law"], modes, timed=paced), belongs_to], axis=1),
+        Timed(np.concatenate([s.time for s in series]), of, np.argmax(belongs_to, axis=1), smooth) if at_once else None,
     )

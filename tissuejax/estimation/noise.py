@@ -81,7 +81,7 @@ class Noise:
         """The same shape with standard deviation 1."""
         return self.scaled(1 / self.std)
 
-    def correlation(self, lag: Float[np.ndarray, "..."] | float) -> Float[np.ndarray, "..."]:
+    def correlation(self, lag: Float[np.ndarray, "..."] | float) -> Float[np.ndarray, "..."] | np.floating:
         """Correlation of two different samples `lag` seconds apart."""
         return self.share * self._faded(np.abs(lag) / self.tau)
 
@@ -103,12 +103,12 @@ class Noise:
             return True
         return float(self.correlation(np.min(np.diff(time)))) < NEGLIGIBLE
 
-    def whiten(self, x: Float[np.ndarray, "n ..."], time: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n ..."]:
+    def whiten(self, x: Float[np.ndarray, "n ..."], time: Float[np.ndarray, " m"]) -> Float[np.ndarray, "n ..."]:
         """L^-1 x, L L' the covariance at `time`: each sample less what those before foretell, over its standard error.
 
         Args:
             x: series in columns.
-            time: s, not decreasing.
+            time: s, not decreasing, one a sample: m = n.
 
         Raises:
             InputError: times that run backwards, or another number of them.

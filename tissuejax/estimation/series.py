@@ -73,7 +73,7 @@ class Series:
 
     segments: tuple[Segment, ...]
     y: Float[np.ndarray, " N"]
-    places: tuple[Int[np.ndarray, " n"], ...]
+    places: tuple[Int[np.ndarray, " _"], ...]
 
     @classmethod
     def of(

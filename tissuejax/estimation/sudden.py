@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-CLOCK = 0.3  # of a recording's duration: by what a clock jumps where the stress would by its peak
-EDGE, MOST = 3, 40  # blocks at either end of a recording that show no step; times in a recording at most
+from tissuejax.estimation.smoothness import USUAL, Smoothness
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class Moment:
         """What it adds beside this prediction, Pa, for an amplitude of one; a column for each thing it may do."""
         peak = float(np.max(np.abs(prediction[series.same(self.rows)])))
         steps = [peak * (self.rows & (series.owner == k)) for k in np.unique(series.owner[self.rows])]
-        late = CLOCK * series.rate(prediction)
+        late = series.smooth.clock * series.rate(prediction)
         return np.stack([*steps, self.rows * prediction, self.rows * late], axis=1)
 
 
@@ -41,11 +40,13 @@ class Timed:
 
     Attributes:
         time: s; owner: index of the series; recording: of the recording.
+        smooth: by how much a clock jumps, and which moments are scanned.
     """
 
     time: Float[np.ndarray, " N"]
     owner: np.ndarray
     recording: np.ndarray
+    smooth: Smoothness = USUAL
 
     def same(self, rows: Bool[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
         """All rows of the recordings that `rows` belong to."""
@@ -70,7 +71,7 @@ class Timed:
         found = []
         for r, name in enumerate(names):
             own = self.recording == r
-            times = np.unique(self.time[own])[EDGE:-EDGE]
-            for t in times[:: max(len(times) // MOST, 1)]:
+            times = np.unique(self.time[own])[self.smooth.edge : -self.smooth.edge]
+            for t in times[:: max(len(times) // self.smooth.moments, 1)]:
                 found.append(Moment(f"at once in {name} at {t:.4g} s", own & (self.time >= t)))
         return found

@@ -4,7 +4,7 @@ expected."""
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Num
 
 from tissuejax.errors import InputError
 from tissuejax.recordings.recording import Recording
@@ -31,7 +31,7 @@ def named(name: str, file: object, what: str) -> None:
         raise refusal(file, f"name of a {what}", found, f"at most {LONGEST}", "Give it a shorter name.")
 
 
-def finite(values: Float[np.ndarray, "..."], file: object, item: str, nan_allowed: bool = False) -> None:
+def finite(values: Num[np.ndarray, "..."], file: object, item: str, nan_allowed: bool = False) -> None:
     """Refuse NaN and infinities (`nan_allowed`: infinities alone), naming the first and how many there are."""
     bad = np.isinf(values) if nan_allowed else ~np.isfinite(values)
     if bad.any():

@@ -17,8 +17,9 @@ from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.judgement.carried import carried
 from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.judgement.evidence import Evidence
-from tissuejax.diagnosis.judgement.explore import Effort, Exploration
+from tissuejax.diagnosis.judgement.explore import Exploration
 from tissuejax.diagnosis.judgement.judge import Judgement, Kind, covering, judge
 from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.rest import level
@@ -29,8 +30,6 @@ from tissuejax.diagnosis.misfit import Misfit, white
 from tissuejax.diagnosis.refit import Refit, refit
 from tissuejax.diagnosis.score import Score
 from tissuejax.estimation.discrepancy import Discrepancy
-
-STEPS = 100  # of a fit that is shown
 
 
 @dataclass
@@ -83,9 +82,8 @@ class Answered:
         """Sets that these data can't tell from the chosen one."""
         if self.judgement.kind is not Kind.AMBIGUOUS:
             return ()
-        return tuple(
-            self.refits[frozenset(s.keys)] for s, _ in covering(self.judgement) if frozenset(s.keys) in self.refits
-        )
+        offers = (frozenset(s.keys) for s, _ in covering(self.judgement, self.exploration.criteria))
+        return tuple(self.refits[k] for k in offers if k in self.refits)
 
     @property
     def misfit(self) -> Misfit:
@@ -192,7 +190,7 @@ def answer(
     out = Answered(shown, found, evidence, judgement)
     keys = [(), judgement.chosen.keys]
     if judgement.kind is Kind.AMBIGUOUS:
-        keys += [s.keys for s, _ in covering(judgement)[:3]]
+        keys += [s.keys for s, _ in covering(judgement, criteria)[: found.effort.rivals]]
     for k in dict.fromkeys(tuple(k) for k in keys):
         shown_fit(out, k)
     return out
@@ -210,13 +208,13 @@ def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
     weighed, scales = out.exploration.weighed[frozenset(keys)], out.exploration.scales
     start = {p: v for p, v in weighed.refit.values.items() if p in out.fitting.free}
     bench = out.fitting.anchored(start)
-    named = scales.widened(keys)
+    named, effort, twins = scales.widened(keys), out.exploration.effort, out.exploration.criteria.twins
     whitening = Whitening(bench, scales.cut, scales.blocked, weighed.parts, weighed.v, named)
     misfit = whitening if keys else white(bench)
 
     def with_fewer(found: Refit, again: Callable[[Mapping[str, float]], Refit]) -> Refit:
         for key in () if bench.costly else keys:
-            while (fewer := merged(bench.candidates[key], found.values)) is not None:
+            while (fewer := merged(bench.candidates[key], found.values, twins)) is not None:
                 out.fitting.candidates = bench.candidates = {**bench.candidates, key: fewer[0]}
                 found = again(fewer[1])
         return found
@@ -232,8 +230,8 @@ def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
         # what is of each recording's own reaches no other: the parameters are fitted to all as if it were not there
         shared = ((own, own), (exact, exact)) if named - {"gain"} else ()
         for model, taken in ((white(bench), own), *shared):
-            near = nearest(bench, model, keys, (start, fit.values, {}))
-            near = with_fewer(near, lambda at, model=model: nearest(bench, model, keys, (at,)))
+            near = nearest(bench, model, keys, (start, fit.values, {}), effort.shown)
+            near = with_fewer(near, lambda at, model=model: nearest(bench, model, keys, (at,), effort.shown))
             left = bench.y - near.prediction
             left = (left - carried(taken, left[:, None])[:, 0])[bench.mask(bench.fitted)]
             ends.append((squares(left / bench.sigma[bench.mask(bench.fitted)]), near, taken))
@@ -258,9 +256,11 @@ def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
     return out.refits[frozenset(keys)]
 
 
-def nearest(bench: Bench, model: Misfit, keys: tuple[str, ...], starts: Sequence[Mapping[str, float]]) -> Refit:
+def nearest(
+    bench: Bench, model: Misfit, keys: tuple[str, ...], starts: Sequence[Mapping[str, float]], steps: int
+) -> Refit:
     """The fit by least squares over what the model leaves open, from whichever start ends nearest."""
-    ends = [refit(bench, model, keys, s, iterations=STEPS, final=False) for s in starts]
+    ends = [refit(bench, model, keys, s, iterations=steps, final=False) for s in starts]
     return min(ends, key=lambda f: f.chi2 if np.isfinite(f.chi2) else np.inf)
 
 

@@ -12,10 +12,10 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.diagnosis.bench import Bench
+from tissuejax.diagnosis.judgement.particular import MEANS, Means
 from tissuejax.estimation.discrepancy import Series, loading_states
 from tissuejax.estimation.series import Segment
-
-SMOOTH = 60  # knots of the stress whose path counts: noise has a path too, and none that tells of anything
+from tissuejax.estimation.smoothness import USUAL, Smoothness
 
 
 @dataclass(frozen=True)
@@ -60,21 +60,21 @@ def path(x: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     return way / way[-1] if way[-1] > 0 else np.linspace(0, 1, len(x))
 
 
-def smoothed(y: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    """y between means of at most SMOOTH pieces."""
-    edges = np.unique(np.linspace(0, len(y), min(SMOOTH, len(y)) + 1).astype(int))
+def smoothed(y: Float[np.ndarray, " n"], knots: int) -> Float[np.ndarray, " n"]:
+    """y between means of at most so many pieces."""
+    edges = np.unique(np.linspace(0, len(y), min(knots, len(y)) + 1).astype(int))
     means = np.add.reduceat(y, edges[:-1]) / np.diff(edges)
     return np.interp(np.arange(len(y)), 0.5 * (edges[:-1] + edges[1:] - 1), means)
 
 
-def blocks(bench: Bench, several: Mapping[str, int] | None = None) -> Blocks:
-    """Blocks of all segments: `several` of each channel's, by default 480 in all and 30 to 100 a segment."""
-    usual = int(np.clip(480 // max(len(bench.segments), 1), 30, 100))
+def blocks(bench: Bench, several: Mapping[str, int] | None = None, means: Means = MEANS) -> Blocks:
+    """Blocks of all segments: `several` of each channel's, by default as many as `means` says."""
+    usual = int(np.clip(means.whole // max(len(bench.segments), 1), means.least, means.most))
     starts, owner = [], []
     for k, s in enumerate(bench.segments):
         n = len(s.time)
         wanted = min((several or {}).get(s.channel, usual), n)
-        way = (np.linspace(0, 1, n) + path(s.drive) + path(smoothed(bench.y[s.rows]))) / 3
+        way = (np.linspace(0, 1, n) + path(s.drive) + path(smoothed(bench.y[s.rows], means.knots))) / 3
         which = np.minimum((way * wanted).astype(int), wanted - 1) if wanted < n else np.arange(n)
         first = np.flatnonzero(np.diff(which, prepend=-1))
         starts.append(s.rows.start + first)
@@ -83,23 +83,26 @@ def blocks(bench: Bench, several: Mapping[str, int] | None = None) -> Blocks:
     return Blocks(flat, np.diff(np.append(flat, len(bench.y))), np.array(owner))
 
 
-def series(bench: Bench, cut: Blocks, states: Sequence[State]) -> list[Series]:
+def series(
+    bench: Bench, cut: Blocks, states: Sequence[State], smooth: Smoothness = USUAL, means: Means = MEANS
+) -> list[Series]:
     """The blocks as the discrepancy sees them.
 
     Args:
         states: of each segment (`driven_states`, or those of a bench that knows more).
+        smooth: how a loading state turns; means: what a typical largest stress is.
     """
     out = []
     for k, (s, state) in enumerate(zip(bench.segments, states, strict=True)):
         own = Blocks(cut.starts[cut.owner == k] - s.rows.start, cut.counts[cut.owner == k], np.zeros(0, int))
-        peaks = [np.quantile(np.abs(bench.y[o.rows]), 0.98) for o in bench.segments if o.recording == s.recording]
+        peaks = [np.quantile(np.abs(bench.y[o.rows]), means.peak) for o in bench.segments if o.recording == s.recording]
         out.append(
             Series(
                 s.recording,
                 state.mode,
                 own.mean(s.time),
                 own.mean(state.strain),
-                own.mean(loading_states(strain(s))),
+                own.mean(loading_states(strain(s), smooth)),
                 float(max(peaks)) or 1.0,
             )
         )

@@ -1,11 +1,16 @@
-"""All numbers of the judgement in one record, each with unit, meaning and ground."""
+"""All numbers that make a verdict of recordings in one record, each with unit, meaning and ground.
+
+How much is tried is `effort.Effort`; both together are `numbers.Numbers`. Numbers that only round stand where they do.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from tissuejax.diagnosis.judgement.particular import MEANS, SHOWN, SIMULATED, STROKES, Means, Shown, Simulated, Strokes
 from tissuejax.estimation.level import OF_NOTE
+from tissuejax.estimation.smoothness import USUAL, Smoothness
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,8 @@ class Criteria:
             the numerical error, in units of what mesh and speed leave open by Richardson's extrapolation.
         strange: by which factor such a part is wider. Ground: 10 makes of 1 to 2 % the 10 to
             20 % by which effects of the catalogue change a recording.
+        partly: chance that a part which one form of an effect widens is wide beside another form of it. Ground: as
+            likely as not.
         settled: families that are never wider: what they are is known, or (an added law) nothing but what another part
             is already: a law beside the base is a share of the stress.
         sudden: standard deviation of the half-normal prior of what happens at once, where something does: share of the
@@ -50,15 +57,24 @@ class Criteria:
             simulation errs as no part of the discrepancy does. Ground: of 24 sealed probings on a mesh that resolves
             their markers (`fits/challenge/probing-fifth`, `-sixth`) maximum likelihood of the answers' being true is at
             0.22 (0.08 to 0.43); sets after them are blind to it.
+        loose: the same of a shape of either sign, in its typical steps. Ground: as wide.
         negligible: root mean square of the rest, as a share of the peak, up to which nothing of note is left.
             Ground: load cells are verified to 1 % (class 1 of ISO 7500-1); half of that.
         unseen: share of a sensor's noise, of single samples, up to which a rest of a simulation is negligible too.
             Ground: markers are seen to a tenth of what most of them move; half of that shows in no picture.
+        alike: neighbouring means of samples of which a rest is one, in how surely its size is known. Ground: a rest is
+            smooth, and as many lie within its finer lengths.
         misstated: factor by which a stated noise level may be wrong: what scatters from sample to sample up to there
             is noise, and beyond it a rest. Ground: a level read off a rest, or off another channel, is seldom worse.
         named: probability from which a name is given. Ground: likelier present than not (the median probability model
             of Barbieri and Berger 2004).
-        covered: share of the probability of named sets that the alternatives offered add up to.
+        covered: share of the probability of named sets that the alternatives offered add up to. Ground:
+            nine of ten, as an interval is usually given.
+        strong: odds from which a form with more parameters is shown in place of a plainer one. Ground: "strong" in the
+            scale of Kass and Raftery (J. Am. Stat. Assoc. 90, 1995).
+        twins: relative difference up to which two relaxation times are one. Ground: no recording tells two so near from
+            one.
+        smooth, shown, means, simulated, strokes: see `Smoothness`, `Shown`, `Means`, `Simulated`, `Strokes`.
     """
 
     sizes: tuple[float, ...] = (0.4, 0.4, 0.15, 0.05)
@@ -72,17 +88,27 @@ class Criteria:
         )
     )
     strange: float = 10.0
+    partly: float = 0.5
     settled: frozenset[str] = frozenset({"peak", "effect", "added law"})
     sudden: float = 0.1
     change: float = 0.3
     rig: float = 0.1
     shape: float = float(np.log(5.0))
     lapse: float = 0.2
+    loose: float = 5.0
     negligible: float = OF_NOTE
     unseen: float = 0.5
+    alike: int = 10
     misstated: float = 2.0
     named: float = 0.5
     covered: float = 0.9
+    strong: float = 20.0
+    twins: float = 0.05
+    smooth: Smoothness = USUAL
+    shown: Shown = SHOWN
+    means: Means = MEANS
+    simulated: Simulated = SIMULATED
+    strokes: Strokes = STROKES
 
     def usual(self, rig: bool) -> float:
         """How much of the stress an effect changes, of the rig or of the tissue."""

@@ -32,8 +32,6 @@ class SetEvidence:
         kurtosis: excess kurtosis of the whitened residuals: jumps that no part of the discrepancy has.
         explained: share of the base's misfit (beyond noise) that the set's model alone removes.
         rest: mean square of the discrepancy left, as a share of the squared peak, and its standard deviation.
-        held: root mean square error of the recordings called held out over their noise, parameters fitted on the
-            others alone; None where there are none or it wasn't asked for.
         numerical: root mean square of what is laid to mesh and step of a simulation, a share of the peak.
     """
 
@@ -52,7 +50,6 @@ class SetEvidence:
     kurtosis: float
     explained: float
     rest: tuple[float, float]
-    held: float | None = None
     numerical: float = 0.0
 
 
@@ -88,8 +85,11 @@ def read_evidence(path: Path) -> Evidence:
     """
     try:
         given = json.loads(Path(path).read_text())
-        tuples = {"keys", "names", "at_bound", "rest"}
-        sets = [SetEvidence(**{k: tuple(v) if k in tuples else v for k, v in s.items()}) for s in given["sets"]]
+        tuples, left_out = {"keys", "names", "at_bound", "rest"}, {"held"}  # what was written once, and never filled
+        sets = [
+            SetEvidence(**{k: tuple(v) if k in tuples else v for k, v in s.items() if k not in left_out})
+            for s in given["sets"]
+        ]
         return Evidence(
             tuple(sets),
             given["forms"],

@@ -9,61 +9,23 @@ best sets are tried in all their forms and with every effect left out.
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.effort import Course, Effort
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.judge import log_prior
 from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.scales import Scales, squared
 from tissuejax.diagnosis.judgement.sudden import begun, beside, happened, held, joined
-from tissuejax.diagnosis.judgement.weigh import ROUNDS, Weighed
+from tissuejax.diagnosis.judgement.weigh import Start, Weighed
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.score import Score, complement, gain, trusted
 from tissuejax.diagnosis.starts import distinct, inside
-
-HOPEFUL = 8.0  # nats below the best set up to which other forms and further effects of a set are tried
-GIVEN_UP = 20.0  # nats below the best set: a set is not followed to the end of its fit
-PROMISED = 2.0  # times the gain of a linear step: fits gained 0.1 to 0.9 of it where it was 30 nats and more (p02)
-AGAIN = 6  # sets weighed anew where something may have happened at once
-LITTLE = -4.0  # nats: a nominee whose linear step promises less is not weighed
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How much is tried.
-
-    Attributes:
-        most: effects in a set at most.
-        singles, pairs, triples: sets weighed when sets of that size are grown.
-        parents: sets of one and of two that are grown further.
-        reshaped: sets that are tried in all their forms, by size.
-        starts: settings of the shapes that a set is begun from.
-        spend: cost of all predictions (of the plain base model each) after which nothing new is begun.
-        nested: searches and memories nested in a prediction at most.
-        rounds, iterations: of fit and amplitudes in turn, and of a fit.
-        least: nats that the linear step of a single effect has to promise.
-        given_up: nats below the best set at which a set is not followed to the end of its fit.
-        stepwise: a second effect is sought only where a first one has come in.
-    """
-
-    most: int = 3
-    singles: int = 10
-    pairs: int = 10
-    triples: int = 6
-    parents: tuple[int, int] = (3, 2)
-    reshaped: tuple[int, ...] = (2, 1, 0)
-    starts: int = 2
-    spend: float = 4e4
-    nested: int = 2
-    rounds: int = ROUNDS
-    iterations: int = 12
-    least: float = LITTLE
-    given_up: float = GIVEN_UP
-    stepwise: bool = False
 
 
 @dataclass
@@ -127,7 +89,7 @@ class Exploration:
     def near(self, size: int) -> list[frozenset]:
         """Those of `ranked` that other forms may bring to the top."""
         top = self.worth(self.best)
-        return [k for k in self.ranked(size) if self.worth(k) > top - HOPEFUL]
+        return [k for k in self.ranked(size) if self.worth(k) > top - self.effort.hopeful]
 
     def parents(self, size: int) -> list[frozenset]:
         """Sets to grow: those near the top; all of `ranked` as long as the best one leaves more than is usual."""
@@ -149,29 +111,43 @@ class Exploration:
         sets = tuple(w.evidence for w in self.weighed.values())
         return Evidence(sets, self.forms, fitted, held_out, self.exhausted, self.bench.costly)
 
-    def weigh(self, order: Sequence[str], starts: Sequence[Mapping[str, float]], **options) -> Weighed | None:
-        """Weigh a set from the best of several starts; remembered. None if there is nothing left to spend."""
-        key = frozenset(order)
-        if key in self.weighed and not set(options) - {"bench"}:
+    def weigh(
+        self,
+        order: Sequence[str],
+        starts: Sequence[Mapping[str, float]],
+        bench: Bench | None = None,
+        v: Float[np.ndarray, " K"] | None = None,
+    ) -> Weighed | None:
+        """Weigh a set from the best of several starts; remembered. None if there is nothing left to spend.
+
+        Args:
+            bench, v: see `Start`; a set that was weighed before is weighed again where `v` is given.
+        """
+        key, effort = frozenset(order), self.effort
+        if key in self.weighed and v is None:
             return self.weighed[key]
-        if order and self.bench.spent > self.effort.spend:
+        if order and self.bench.spent > effort.spend:
             self.exhausted = True
             return None
         self._tell("weighing", order)
-        if len(starts) > 1:
-            short = {"rounds": 1, "iterations": 5, **options}
-            tried = [self.kept.weigh(self.scales, order, s, self.criteria, **short) for s in starts]
+        begin = [Start(s, v, bench) for s in starts]
+        if len(begin) > 1:
+            short = replace(effort.course, rounds=1, iterations=effort.trial)
+            tried = [self.kept.weigh(self.scales, order, s, self.criteria, short) for s in begin]
             first = max(tried, key=lambda w: w.evidence.log_evidence)
-            starts = [first.refit.values or starts[0]]
-            options = {"v": first.v, **options} if first.refit.values else options
-        floor = self.weighed[self.best].evidence.log_evidence - self.effort.given_up
-        options = {"rounds": self.effort.rounds, "iterations": self.effort.iterations, **options}
-        options = {"anchor": not self.bench.costly, **options}
-        found = self.kept.weigh(self.scales, order, starts[0], self.criteria, floor=floor, **options)
+            if first.refit.values:
+                begin = [Start(first.refit.values, first.v if v is None else v, bench)]
+        floor = self.weighed[self.best].evidence.log_evidence - effort.given_up
+        course = replace(self._course, floor=floor, anchor=not self.bench.costly)
+        found = self.kept.weigh(self.scales, order, begin[0], self.criteria, course)
         old = self.weighed.get(key)
         if old is None or found.evidence.log_evidence > old.evidence.log_evidence:
             self.weighed[key] = found
         return self.weighed[key]
+
+    @property
+    def _course(self) -> Course:
+        return replace(self.effort.course, rounds=self.effort.rounds, iterations=self.effort.iterations)
 
     def score(self, key: frozenset) -> list[Score]:
         """Every candidate that may join the set, by the log evidence that its linear step gains, best first."""
@@ -267,13 +243,15 @@ class Exploration:
 
     def _behind(self, key: frozenset, score: Score) -> bool:
         """Whether a set would stay behind the best one though it gained a multiple of what its linear step promises."""
-        return self.worth(key) + PROMISED * max(score.gain, 0.0) < self.worth(self.best) - HOPEFUL
+        reach = self.worth(key) + self.effort.promised * max(score.gain, 0.0)
+        return reach < self.worth(self.best) - self.effort.hopeful
 
     def _grown(self, key: frozenset, score: Score) -> Weighed | None:
         parent, candidate = self.weighed[key], self.bench.candidates[score.key]
+        short = self.effort.short if not key and self.effort.starts > 1 else 0
         starts = [
             {**parent.refit.values, **setting, **inside(self.bench, candidate, step, setting, parent.refit.values)}
-            for _, step, setting in distinct(score, self.effort.starts, whole=not key and self.effort.starts > 1)
+            for _, step, setting in distinct(score, self.effort.starts, self.effort.worthwhile, short)
         ]
         alone = self._alone(key, score.key)
         # beside a discrepancy that has taken up the misfit a step from nothing is short: a gap, say, is far from where
@@ -317,7 +295,7 @@ class Exploration:
         """Whether a form, weighed alone, was far behind another form of its effect."""
         alone = {k: self.worth(k) for k in self.weighed if len(k) == 1 and self.same(k, frozenset({form}))}
         own = alone.get(frozenset({form}))
-        return own is not None and own < max(alone.values()) - HOPEFUL
+        return own is not None and own < max(alone.values()) - self.effort.hopeful
 
     def same(self, a: frozenset, b: frozenset) -> bool:
         """Whether two sets hold the same effects."""
@@ -331,25 +309,24 @@ class Exploration:
         while left := [k for k in self.near(size) if not self.weighed[k].settled]:
             w = self.weighed[left[0]]
             self._tell("settling", w.evidence.keys)
-            again = self._settled(w, at := w.refit.values, v=w.v)
+            again = self._settled(w, at := w.refit.values, w.v)
             if again.evidence.log_evidence == -math.inf:  # the fine simulation breaks down there
                 again = self._settled(w, {**at, **{p: self.scales.values[p] for p in self.bench.base}})
             self.weighed[left[0]] = again
 
-    def _settled(self, w: Weighed, start: Mapping[str, float], **options) -> Weighed:
-        effort = {"rounds": self.effort.rounds, "iterations": self.effort.iterations}
-        return self.kept.weigh(self.scales, w.evidence.keys, start, self.criteria, bench=w.bench, **effort, **options)
+    def _settled(self, w: Weighed, values: Mapping[str, float], v: Float[np.ndarray, " K"] | None = None) -> Weighed:
+        return self.kept.weigh(self.scales, w.evidence.keys, Start(values, v, w.bench), self.criteria, self._course)
 
     def look_again(self) -> None:
         """Weigh the best sets and the base anew beside what may have happened at once by the best of them."""
         while (moment := happened(self.scales, self.weighed[self.best], self.criteria)) is not None:
             self._tell("looking at what happened at once beside", sorted(self.names(self.best)))
-            best = sorted(self.weighed, key=self.worth)[: -AGAIN - 1 : -1]
+            best = sorted(self.weighed, key=self.worth)[: -self.effort.again - 1 : -1]
             self.scales = joined(self.scales, moment)
             for key, w in self.weighed.items():
                 self.weighed[key] = beside(w, moment)
                 if key in best or not key:
-                    again = self._settled(w, w.refit.values, v=begun(w, self.criteria))
+                    again = self._settled(w, w.refit.values, begun(w, self.criteria))
                     if again.evidence.log_evidence > w.evidence.log_evidence:
                         self.weighed[key] = again
             if not held(self.weighed[self.best], moment):

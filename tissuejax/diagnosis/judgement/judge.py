@@ -29,8 +29,6 @@ from scipy.stats import norm
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence, SetEvidence
 
-STRONG = math.log(20)  # odds from which evidence is called strong (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995)
-
 
 class Kind(enum.StrEnum):
     """The five answers."""
@@ -166,7 +164,7 @@ def judge(evidence: Evidence, criteria: Criteria | None = None) -> Judgement:
     kind = max(Kind, key=lambda k: chances[k])
     chosen = _chosen(kind, stated, named, p, best, empty)
     ranked = sorted((k for k in named if best[k] is not chosen), key=lambda k: -p[k])
-    chosen = _plainest(groups[frozenset(chosen.names)])
+    chosen = _plainest(groups[frozenset(chosen.names)], criteria.strong)
     return Judgement(
         kind,
         chances,
@@ -191,13 +189,13 @@ def _chosen(kind, stated, named, p, best, empty) -> SetEvidence:
     return best[max(named, key=p.get)]
 
 
-def _plainest(forms: Sequence[tuple[float, SetEvidence]]) -> SetEvidence:
+def _plainest(forms: Sequence[tuple[float, SetEvidence]], strong: float) -> SetEvidence:
     """The form of a set that is shown, of (weight, form): the one with fewest parameters that none beats strongly.
 
     What is named does not depend on it. A third relaxation time that is no more than likely has no error to show.
     """
     top = max(w for w, _ in forms)
-    return min((s.k, -w, i, s) for i, (w, s) in enumerate(forms) if w > top - STRONG)[-1]
+    return min((s.k, -w, i, s) for i, (w, s) in enumerate(forms) if w > top - math.log(strong))[-1]
 
 
 def covering(judgement: Judgement, criteria: Criteria | None = None) -> tuple[tuple[SetEvidence, float], ...]:

@@ -8,14 +8,16 @@ asks in the same order, and takes them up where they were: one prediction and on
 import json
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.effort import Course
 from tissuejax.diagnosis.judgement.scales import Scales
-from tissuejax.diagnosis.judgement.weigh import Weighed, weigh
+from tissuejax.diagnosis.judgement.weigh import Start, Weighed, weigh
 from tissuejax.storage import write_json
 
 NAME = "weighed.json"
@@ -38,21 +40,19 @@ class Kept:
         self.before = len(self._sets)
         self._write()
 
-    def weigh(
-        self, scales: Scales, keys: Sequence[str], start: Mapping[str, float], criteria: Criteria, **options
-    ) -> Weighed:
+    def weigh(self, scales: Scales, keys: Sequence[str], start: Start, criteria: Criteria, course: Course) -> Weighed:
         """As `weigh`; from where the same question came to rest before, if it is known."""
         if self.path is None or scales.bench.costly:  # simulations are kept one by one, by themselves
-            return weigh(scales, keys, start, criteria, **options)
+            return weigh(scales, keys, start, criteria, course)
         name = f"{len(scales.families)} parts: {' + '.join(keys)}"
         self._asked[name] += 1
         name = f"{name} ({self._asked[name]})"
         if (known := self._sets.get(name)) is not None:
             self.taken_up += 1
-            again = {"bench": options.get("bench"), "anchor": options.get("anchor", True)}
-            at, v = known["values"], np.array(known["v"])
-            return weigh(scales, keys, start, criteria, v=v, rounds=1, iterations=0, at=at, **again)
-        found = weigh(scales, keys, start, criteria, **options)
+            rested = replace(start, at=known["values"], v=np.array(known["v"]))
+            once = replace(course, rounds=1, iterations=0, floor=-math.inf)
+            return weigh(scales, keys, rested, criteria, once)
+        found = weigh(scales, keys, start, criteria, course)
         total = found.evidence.log_evidence
         if math.isfinite(total):  # where nothing can be predicted it is soon found out again
             self._sets[name] = {"values": found.refit.values, "v": found.v.tolist(), "log_evidence": total}

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.optimize import lsq_linear
@@ -44,6 +44,10 @@ class Linear:
     jacobian: Float[np.ndarray, "N p"]
     offset: Float[np.ndarray, " p"]
     weak: Float[np.ndarray, " p"]
+
+    def of(self, these: Bool[np.ndarray, " p"]) -> "Linear":
+        """By these parameters alone; the others are held."""
+        return Linear(self.residual, self.jacobian[:, these], self.offset[these], self.weak[these])
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,9 @@ import json
 from pathlib import Path
 
 from tissuejax.diagnosis.judgement.criteria import Criteria
-from tissuejax.diagnosis.judgement.evidence import Evidence, read_evidence
+from tissuejax.diagnosis.judgement.evidence import read_evidence
 from tissuejax.diagnosis.judgement.judge import Judgement, Kind, covering, judge
+from tissuejax.errors import InputError
 from tissuejax.storage import write_json
 
 
@@ -25,19 +26,24 @@ def verdict_of(j: Judgement, criteria: Criteria | None = None) -> dict:
 
 
 def rejudge(folder: Path, criteria: Criteria | None = None) -> dict[str, str]:
-    """Judge the evidence of every case in FOLDER/results again and rewrite the verdict in its `result.json`.
+    """Judge the evidence of every case in FOLDER/results again; returns the verdicts by case.
 
-    What a fit says (errors, parameters) stays as it was. Returns the verdicts by case.
+    By the usual criteria the verdict in each `result.json` is rewritten; what a fit says (errors, parameters) stays as
+    it was. By others nothing is written: a stored verdict is one by the usual criteria.
 
     Raises:
-        InputError: evidence that can't be read.
+        InputError: no evidence there, or some that can't be read.
     """
+    paths = sorted(Path(folder).glob("results/*/evidence.json"))
+    if not paths:
+        raise InputError(f"{folder}: no case with evidence; `tissuejax challenge run {folder}` writes it")
     out = {}
-    for path in sorted(Path(folder).glob("results/*/evidence.json")):
-        evidence: Evidence = read_evidence(path)
-        verdict = verdict_of(judge(evidence, criteria), criteria)
+    for path in paths:
+        verdict = verdict_of(judge(read_evidence(path), criteria), criteria)
+        out[path.parent.name] = verdict["verdict"]
+        if criteria is not None and criteria != Criteria():
+            continue
         result = path.with_name("result.json")
         known = json.loads(result.read_text()) if result.exists() else {}
         write_json(result, known | verdict)
-        out[path.parent.name] = verdict["verdict"]
     return out

@@ -60,10 +60,10 @@ def _times(part: Part, rows: Sequence[slice], w: Float[np.ndarray, " M"]) -> Flo
     return np.concatenate([b @ w[r] for b, r in zip(part.within, rows, strict=True)])
 
 
-def wobble(mean: np.ndarray, variance: np.ndarray, peak: float) -> float:
-    """Standard deviation of the mean square of a normal vector, entries taken in independent tens."""
+def wobble(mean: np.ndarray, variance: np.ndarray, alike: int) -> float:
+    """Standard deviation of the mean square of a normal vector of which so many neighbours are one."""
     each = 2 * variance**2 + 4 * variance * mean**2
-    return math.sqrt(10 * float(np.sum(each))) / len(mean) / peak**2
+    return math.sqrt(alike * float(np.sum(each))) / len(mean)
 
 
 def numerical(scales: "Scales", parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> float:

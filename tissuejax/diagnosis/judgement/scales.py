@@ -125,7 +125,7 @@ class Scales:
         width = np.array([wide.get(f, criteria.shares[f]) for f in self.families])
         sudden = np.array([f == "sudden" for f in self.families])
         several = max(int(np.sum(free & ~sudden)), 1)
-        chance = free * criteria.unknown / several + 0.5 * partly
+        chance = free * criteria.unknown / several + criteria.partly * partly
         if not sudden.any():
             return Widths(width, chance, criteria.strange)
         chance = np.where(sudden, criteria.unknown / max(self.moments, 1), chance)
@@ -180,7 +180,7 @@ def scaled(
     sigma = cut.spread(bench.sigma)
     edges = np.flatnonzero(np.diff(cut.owner, prepend=-1))
     rows = tuple(slice(int(a), int(b)) for a, b in zip(edges, [*edges[1:], len(sigma)], strict=True))
-    peak = max(float(np.quantile(np.abs(bench.y[s.rows]), 0.98)) for s in bench.segments) or 1.0
+    peak = max(float(np.quantile(np.abs(bench.y[s.rows]), criteria.means.peak)) for s in bench.segments) or 1.0
     shared = None if bench.shared is None else bench.shared[cut.owner[[r.start for r in rows]]]
     made = Scales(bench, of, (), cut, Blocked(rows, sigma, shared), values, cut.mean(prediction), peak)
     if bench.costly:
@@ -206,7 +206,7 @@ def with_priors(
                 logs = np.log(scanned)
                 priors[path] = (float(np.mean(logs)), float(np.hypot(criteria.shape, np.std(logs))))
             else:
-                width = max(5 * f.scale, float(np.ptp(scanned)))
+                width = max(criteria.loose * f.scale, float(np.ptp(scanned)))
                 priors[path] = (float(np.mean(scanned)), width)
     for path, prior in priors.items():
         free[path] = replace(free[path], prior=prior)

@@ -5,19 +5,20 @@ tried in all its forms. What happened at once comes in before the pairs where it
 the base, than any single effect does, and at the end beside the best sets.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from tissuejax.diagnosis.bench import Bench
+from tissuejax.diagnosis.bench import Bench, Free
 from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.judgement.coloured import coloured
 from tissuejax.diagnosis.judgement.criteria import Criteria
-from tissuejax.diagnosis.judgement.explore import Effort, Exploration
+from tissuejax.diagnosis.judgement.effort import Effort
+from tissuejax.diagnosis.judgement.explore import Exploration
 from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.scales import Scales, scaled
 from tissuejax.diagnosis.judgement.sudden import disrupted
-from tissuejax.diagnosis.judgement.weigh import Weighed
+from tissuejax.diagnosis.judgement.weigh import Start, Weighed
 from tissuejax.errors import NotConverged
 from tissuejax.estimation.discrepancy import Discrepancy
 
@@ -44,22 +45,12 @@ def explore(
         NotConverged: the base model can't be fitted at all.
     """
     criteria, effort, kept = criteria or Criteria(), effort or Effort(), kept or Kept()
-    start = {p: bench.start[p] for p in bench.base}
     if report:
         report("fitting the base model")
-    bench = bench.anchored(start)
-    scales = scaled(bench, cut, of, bench.y, start, criteria)
-    base = kept.weigh(scales, (), start, criteria)
-    if not np.isfinite(base.evidence.log_evidence):
-        raise NotConverged(
-            f"the base model can't be fitted to {', '.join(bench.fitted)}: its prediction is not finite there from any "
-            "parameters tried; name another --energy, or leave out the samples of largest strain"
-        )
-    if (noise := coloured(scales.blocked, bench, cut, base.refit.prediction)) is not None:
-        scales.blocked = noise
-        base = kept.weigh(scales, (), base.refit.values, criteria)
+    scales, base = based(bench, cut, of, criteria, effort, kept)
+    bench = scales.bench
     e = alone(bench, scales, base, criteria, effort, report, kept)
-    scales, disturbed = disrupted(scales, base, criteria)
+    scales, disturbed = disrupted(scales, base, criteria, effort.course)
     if e.log_worth(disturbed) > e.worth(e.best):  # better than any single effect: all of them beside what happened
         e = alone(bench, scales, disturbed, criteria, effort, report, kept)
     if bench.costly:  # one start was all that the base had
@@ -70,7 +61,7 @@ def explore(
             break  # a third effect is sought where a second one has come in, or much is left
         if effort.stepwise and len(e.best) < size:
             break
-        e.extend(parents, most, max(most // len(parents), 1) + 2)
+        e.extend(parents, most, max(most // len(parents), 1) + effort.spare)
         for key in e.near(size + 1)[: effort.reshaped[size]]:
             e.reshape(key)
         e.settle(size + 1)
@@ -78,6 +69,42 @@ def explore(
         e.settle(size)
     e.look_again()
     return e
+
+
+def based(
+    bench: Bench,
+    cut: Blocks,
+    of: Discrepancy,
+    criteria: Criteria,
+    effort: Effort,
+    kept: Kept,
+    start: Start | None = None,
+) -> tuple[Scales, Weighed]:
+    """The base model weighed, and the scales of the sample with the noise that its residual shows.
+
+    Args:
+        start: of the base's fit; its neutral values by default.
+    """
+    start = start or Start({p: bench.start[p] for p in bench.base})
+    bench = bench.anchored(start.values)
+    scales = scaled(bench, cut, of, bench.y, start.values, criteria)
+    base = kept.weigh(scales, (), start, criteria, effort.course)
+    if not np.isfinite(base.evidence.log_evidence):
+        raise NotConverged(
+            f"the base model can't be fitted to {', '.join(bench.fitted)}: its prediction is not finite there from any "
+            "parameters tried; name another --energy, or leave out the samples of largest strain"
+        )
+    if (noise := coloured(scales.blocked, bench, cut, base.refit.prediction)) is not None:
+        scales.blocked = noise
+        base = kept.weigh(scales, (), Start(base.refit.values), criteria, effort.course)
+    return scales, base
+
+
+def rooted(scales: Scales, base: Weighed, free: Mapping[str, Free]) -> None:
+    """The scales about the base's fit, where the sizes of effects are taken."""
+    scales.values, scales.reference = base.refit.values, scales.cut.mean(base.refit.prediction)
+    scales.bench = (base.bench or scales.bench).anchored(base.refit.values).rooted(base.refit.values)
+    scales.bench.free = dict(free)  # without the priors of a set
 
 
 def alone(
@@ -90,9 +117,7 @@ def alone(
     kept: Kept | None = None,
 ) -> Exploration:
     """An exploration with the base and all single effects weighed."""
-    scales.values, scales.reference = base.refit.values, scales.cut.mean(base.refit.prediction)
-    scales.bench = (base.bench or bench).anchored(base.refit.values).rooted(base.refit.values)
-    scales.bench.free = bench.free  # without the priors of a set
+    rooted(scales, base, bench.free)
     e = Exploration(
         scales.bench, criteria, effort, scales, report or (lambda _: None), {frozenset(): base}, kept=kept or Kept()
     )

@@ -17,9 +17,10 @@ from scipy.linalg import cho_solve
 from scipy.special import logsumexp
 
 from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.effort import Course
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, factored, smooth
 from tissuejax.diagnosis.judgement.scales import Scales
-from tissuejax.diagnosis.judgement.weigh import Weighed, weigh
+from tissuejax.diagnosis.judgement.weigh import Start, Weighed, weigh
 from tissuejax.estimation.discrepancy import Discrepancy, Part
 from tissuejax.estimation.sudden import Moment
 
@@ -33,7 +34,7 @@ def happened(scales: Scales, at: Weighed, criteria: Criteria) -> Moment | None:
         return None
     if len(of.sudden) > len({s.recording for s in scales.bench.segments}):  # one in each, and one more
         return None
-    moments, known = _moments(scales), {s.name for s in of.sudden}
+    moments, known = scanned(scales), {s.name for s in of.sudden}
     if not moments:
         return None
     prediction = scales.cut.mean(at.refit.prediction)
@@ -46,11 +47,13 @@ def happened(scales: Scales, at: Weighed, criteria: Criteria) -> Moment | None:
     return moments[int(np.argmax(odds))]
 
 
-def disrupted(scales: Scales, base: Weighed, criteria: Criteria) -> tuple[Scales, Weighed]:
+def disrupted(
+    scales: Scales, base: Weighed, criteria: Criteria, course: Course | None = None
+) -> tuple[Scales, Weighed]:
     """Scales and base with all that may have happened beside the base alone, one after the other."""
     while (moment := happened(scales, base, criteria)) is not None:
         scales = joined(scales, moment)
-        base = weigh(scales, (), base.refit.values, criteria, v=begun(base, criteria))
+        base = weigh(scales, (), Start(base.refit.values, begun(base, criteria)), criteria, course)
         if not held(base, moment):
             break
     return scales, base
@@ -75,7 +78,8 @@ def beside(w: Weighed, moment: Moment) -> Weighed:
     return replace(w, evidence=evidence, v=np.append(w.v, 0.0), parts=(*w.parts, part))
 
 
-def _moments(scales: Scales) -> list[Moment]:
+def scanned(scales: Scales) -> list[Moment]:
+    """All moments that are asked whether something happened then."""
     return scales.discrepancy.timed.moments(list(dict.fromkeys(s.recording for s in scales.bench.segments)))
 
 
@@ -125,5 +129,5 @@ def joined(scales: Scales, moment: Moment) -> Scales:
     of = scales.discrepancy
     made.discrepancy = replace(of, sudden=(*of.sudden, moment))
     made.families = (*scales.families, "sudden")
-    made.moments = len(_moments(scales))
+    made.moments = len(scanned(scales))
     return made

@@ -10,20 +10,20 @@ from dataclasses import replace
 
 from tissuejax.diagnosis.bench import Candidate
 
-ALIKE = 0.05  # of their ratio: times closer than that are one; no recording here tells two so near from one
 COUNTED = {"two times": "one time", "three times": "two times"}
 
 
-def merged(candidate: Candidate, values: Mapping[str, float]) -> tuple[Candidate, dict[str, float]] | None:
+def merged(candidate: Candidate, values: Mapping[str, float], near: float) -> tuple[Candidate, dict[str, float]] | None:
     """The candidate without the later of two like times, and where to begin with it; None where there are none.
 
     Args:
         values: the fit, by dotted path; pairs "NAME.g2", "NAME.tau2" of shares and times.
+        near: relative difference up to which two times are one (`Criteria.twins`).
     """
     times = [p for p in candidate.paths if p.rpartition(".")[2].startswith("tau") and p in values]
     for i, first in enumerate(times):
         for second in times[i + 1 :]:
-            if values[first] > 0 and abs(math.log(values[second] / values[first])) < ALIKE:
+            if values[first] > 0 and abs(math.log(values[second] / values[first])) < near:
                 shares = [p.replace(".tau", ".g") for p in (first, second)]
                 gone = {second, shares[1]}
                 start = {p: v for p, v in values.items() if p not in gone}

@@ -9,7 +9,7 @@ Positive shapes have normal priors of their logarithms. Fit and amplitudes of th
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -18,6 +18,7 @@ from scipy.stats import kurtosis
 
 from tissuejax.diagnosis.bench import Bench, Candidate
 from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.effort import Course
 from tissuejax.diagnosis.judgement.evidence import SetEvidence
 from tissuejax.diagnosis.judgement.marginal import (
     Linear,
@@ -33,9 +34,6 @@ from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.refit import Descent, Refit, Resting, refit
 from tissuejax.estimation.discrepancy import Part
 
-ROUNDS = 4  # of fit and amplitudes in turn
-SHORTENED = 5  # halvings of a step to where the fine simulation fails
-SETTLED = 0.1  # nats: a round that gains less is the last
 FELT = 1e-6  # of the peak: what is no rounding, by its slope
 WILD = 1e3  # of the peak: a prediction beyond that has no density, were it of one sample alone
 NOTHING = 1e-12  # of the peak: a change of the stress that is rounding
@@ -52,6 +50,7 @@ class Weighed:
         rest: the discrepancy's posterior mean over the blocks, Pa.
         bench: that it was weighed on; `settled`: whether its predictions are exact at the fit.
         linear: the problem about the fit; None of an impossible set.
+        begun: values at which it began, by which the priors of its amplitudes go.
     """
 
     evidence: SetEvidence
@@ -62,6 +61,7 @@ class Weighed:
     bench: Bench | None = None
     settled: bool = True
     linear: Linear | None = None
+    begun: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -100,46 +100,50 @@ def beside(slope: float, curvature: float) -> float:
     return 0.5 * math.log(math.pi / (2 * h)) + math.log(erfcx(max(slope, 0.0) / math.sqrt(2 * h)))
 
 
+@dataclass(frozen=True)
+class Start:
+    """Where the weighing of a set begins.
+
+    Attributes:
+        values: parameters, by which the priors of the amplitudes go too.
+        v: squared amplitudes of the discrepancy; of their prior's size by default.
+        bench: where a cheap simulation is corrected, with the correction to begin with; that of the base by default.
+        at: where the fit begins, if not at `values`.
+    """
+
+    values: Mapping[str, float]
+    v: Float[np.ndarray, " K"] | None = None
+    bench: Bench | None = None
+    at: Mapping[str, float] | None = None
+
+
 def weigh(
-    scales: Scales,
-    keys: Sequence[str],
-    start: Mapping[str, float],
-    criteria: Criteria,
-    v: Float[np.ndarray, " K"] | None = None,
-    rounds: int = ROUNDS,
-    iterations: int = 12,
-    floor: float = -math.inf,
-    bench: Bench | None = None,
-    anchor: bool = True,
-    at: Mapping[str, float] | None = None,
+    scales: Scales, keys: Sequence[str], start: Start, criteria: Criteria, course: Course | None = None
 ) -> Weighed:
     """Fit the set `keys` from `start` and weigh it.
 
     Args:
-        bench: where a cheap simulation is corrected, with the correction to begin with; that of the base by default.
-        anchor: whether the correction is taken anew where the fit comes to rest.
-        v: squared amplitudes to begin with; of their prior's size by default.
-        at: where the fit begins, if not at `start`, by which the priors of the amplitudes go.
-        floor: log evidence below which the set is hopeless and not followed further.
+        course: how far the fit is followed; that of a search's base by default.
     """
+    course = course or Course()
     names = scales.bench.fitted
     widths = scales.priors(criteria, keys)
-    anew, v = v is None, widths.width**2 if v is None else v
-    bench, priors = with_priors(scales, keys, start, criteria, bench)
+    anew, v = start.v is None, widths.width**2 if start.v is None else start.v
+    bench, priors = with_priors(scales, keys, start.values, criteria, start.bench)
     y, best = scales.cut.mean(bench.y), None
-    at, tolerance, raw = dict(at or start), 0.5, None
-    bench = bench.anchored(at) if anchor else bench.nearer(at)
+    at, tolerance, raw = dict(start.at or start.values), course.first, None
+    bench = bench.anchored(at) if course.anchor else bench.nearer(at)
     parts = scales.about(bench.predict(at), bench, keys, at)
     # what laws of effects err by lies across the slopes at a fit, and before the first there are none
     exact = np.where([f == "effect" for f in scales.families], 0.0, v)
-    for turn in range(rounds):
+    for turn in range(course.rounds):
         misfit = Whitening(bench, scales.cut, scales.blocked, parts, v if turn else exact)
         seed = None if raw is None or bench.costly else misfit.whiten_means(raw)
-        fit = refit(bench, misfit, keys, at, iterations=iterations, tolerance=tolerance, errors=False, seed=seed)
+        fit = refit(bench, misfit, keys, at, iterations=course.iterations, tolerance=tolerance, errors=False, seed=seed)
         if not np.isfinite(fit.chi2):
             break
-        if anchor:
-            bench, fit = _anchored(bench, fit, at)
+        if course.anchor:
+            bench, fit = _anchored(bench, fit, at, course.shortened)
         if not np.max(np.abs(fit.prediction)) < WILD * scales.peak:
             break  # shares of it would cover all that was measured
         descent = Descent(bench, misfit, tuple(fit.values), names, {})
@@ -161,8 +165,11 @@ def weigh(
         # what nothing is known of, neither from the data nor before, has no density and is left alone
         dead = np.max(np.abs(jac), axis=0, initial=0.0) * descent.scale <= NOTHING * scales.peak
         free = ~bound & ~(dead & (weak == 0))
-        linear = Linear(residual, jac[:, free], offset[free], weak[free])
-        v, m = _amplitudes(linear, parts, widths, scales.blocked, v, anew, bench.costly)
+        every = Linear(residual, jac, offset, weak)
+        linear = every.of(free)
+        # anew from where all is wide that may be; where predictions are costly fits are few, and both are tried
+        begin = frozenset({"wide"} if anew else {"there"}) | ({"there"} if bench.costly else set())
+        v, m = _amplitudes(linear, parts, widths, scales.blocked, v, begin, course.settled)
         anew = False
         value = m.value + 0.5 * int(np.sum(free)) * math.log(2 * math.pi)
         # of these parameters, and not of those that a straight line leads to: the parts move with the prediction
@@ -174,7 +181,7 @@ def weigh(
             if q is not None
         )
         # what rests on a bound was left out of the integral: its own factor, and its prior's square, follow
-        held = _on_bounds(scales, parts, v, residual, jac, resting, weak, offset, free, m.precision)
+        held = _on_bounds(scales, parts, v, every, resting, free, m.precision)
         occam = amplitude_mass(linear, parts, widths, scales.blocked, v, m)
         total = value + held + occam
         if best is None or total > best.total + 1e-6:
@@ -185,21 +192,21 @@ def weigh(
             )
         else:
             break
-        if gained < SETTLED or total + ahead < floor:
+        if gained < course.settled or total + ahead < course.floor:
             break
-        at, tolerance = dict(fit.values), tolerance if bench.costly else 0.1
+        at, tolerance = dict(fit.values), tolerance if bench.costly else course.later
     if best is None:
         return _impossible(scales, keys)
-    return replace(_described(scales, keys, best, criteria), settled=anchor)
+    return replace(_described(scales, keys, best, criteria), settled=course.anchor, begun=dict(start.values))
 
 
-def _anchored(bench: Bench, fit: Refit, start: Mapping[str, float]) -> tuple[Bench, Refit]:
+def _anchored(bench: Bench, fit: Refit, start: Mapping[str, float], shortened: int) -> tuple[Bench, Refit]:
     """The bench corrected where a fit came to rest, and the fit; nearer to its start where the fine simulation fails.
 
     A law that softens may be stable on a coarse mesh, where strains are averaged, and not on a fine one.
     """
     first = fit
-    for _ in range(SHORTENED):
+    for _ in range(shortened):
         near = bench.anchored(fit.values)
         if near is not bench or fit is not first:
             fit = replace(fit, prediction=near.predict(fit.values))
@@ -209,22 +216,24 @@ def _anchored(bench: Bench, fit: Refit, start: Mapping[str, float]) -> tuple[Ben
     return bench, fit  # its prediction is not finite, and ends the search
 
 
-def _amplitudes(linear, parts, widths: Widths, blocked, v, anew: bool, both: bool) -> tuple[np.ndarray, Marginal]:
-    """`amplitudes` from `v`; anew also from where all is wide that may be: alone, or beside that from `v`.
+def _amplitudes(
+    linear: Linear, parts, widths: Widths, blocked, v, begin: frozenset[str], settled: float
+) -> tuple[np.ndarray, Marginal]:
+    """`amplitudes` from where all is wide that may be ("wide"), from `v` ("there"), or the better of both.
 
     A part that is empty, as that of effects is where none acts, stays at nothing.
     """
     v, tried = np.where([p.factor is None or np.any(p.factor) for p in parts], v, 0.0), []
-    if anew:
-        wide = amplitudes(linear, parts, widths.widest, blocked, v, tolerance=SETTLED)[0]
+    if "wide" in begin:
+        wide = amplitudes(linear, parts, widths.widest, blocked, v, tolerance=settled)[0]
         tried.append(amplitudes(linear, parts, widths, blocked, wide))
-    if both or not anew:
+    if "there" in begin:
         tried.append(amplitudes(linear, parts, widths, blocked, v))
     return max(tried, key=lambda t: t[1].value + float(np.sum(widths.log_shape(t[0] / widths.width**2))))
 
 
-def _on_bounds(scales, parts, v, residual, jac, resting: Resting, weak, offset, free, precision) -> float:
-    """Log mass beside the bounds of what rests on them.
+def _on_bounds(scales: Scales, parts, v, every: Linear, resting: Resting, free, precision) -> float:
+    """Log mass beside the bounds of what rests on them, of `every` parameter of a set.
 
     Each with the `free` parameters, of that precision, integrated out: what they take up of its curvature is no
     information on it. Of two on their bounds the other is held.
@@ -244,7 +253,8 @@ def _on_bounds(scales, parts, v, residual, jac, resting: Resting, weak, offset, 
         light = solve(a)
         return light - g @ np.linalg.solve(inner, u.T @ light)
 
-    w, total = whole(residual), 0.0
+    jac, weak, offset = every.jacobian, every.weak, every.offset
+    w, total = whole(every.residual), 0.0
     others = whole(jac[:, free])
     for i in np.flatnonzero(resting.on):
         slope = float(resting.side[i]) * float(weak[i] * offset[i] - jac[:, i] @ w)
@@ -303,7 +313,7 @@ def _described(scales: Scales, keys: Sequence[str], best: Round, criteria: Crite
         n=n,
         kurtosis=float(kurtosis(whitened)),
         explained=float(np.clip(1 - max(chi2 - n, 0.0) / base, -1.0, 1.0)),
-        rest=(float(np.mean(left**2 + open_still)) + spiky, wobble(left, open_still, 1.0)),
+        rest=(float(np.mean(left**2 + open_still)) + spiky, wobble(left, open_still, criteria.alike)),
         numerical=numerical(scales, parts, v),
     )
     size = scales.peak if scales.size is None else scales.size

@@ -37,8 +37,9 @@ class Cuts(Recorded):
 
     def left(self) -> tuple[Blocks, Discrepancy]:
         """See `Recorded.left`."""
-        cut, whole = blocks(self.whole), self.whole
-        return cut, cutting_discrepancy(whole, cut, whole.fresh, whole.bevels)
+        criteria, whole = self.question.criteria, self.whole
+        cut = blocks(whole, means=criteria.means)
+        return cut, cutting_discrepancy(whole, cut, whole.fresh, whole.bevels, criteria)
 
     def finished(self, found: Answered) -> Diagnosis:
         """See `Recorded.finished`."""

@@ -34,16 +34,17 @@ class MaterialTests(Recorded):
         for fitted, held_out in ((q.fitted, q.held_out), (q.every, ())):
             bench = MaterialBench.of(q.sample, q.energy, fitted, held_out, sigma, q.tried)
             tell(bench, q.known)
-            bench.candidates, left_out = offered(q.sample, bench.candidates, q.effects)
+            bench.candidates, left_out = offered(q.sample, bench.candidates, q.effects, q.criteria.shown)
             made.append(bench)
         return cls(question, *made, remarks=remarks + left_out)
 
     def left(self) -> tuple[Blocks, Discrepancy]:
         """See `Recorded.left`."""
-        cut, whole = blocks(self.whole), self.whole
-        states = strain_states(whole)
-        changing = paced(self.question.sample)
-        return cut, discrepancy(series(whole, cut, states), cut.spread(whole.sigma), changing, at_once=True)
+        criteria, whole = self.question.criteria, self.whole
+        cut = blocks(whole, means=criteria.means)
+        stacked = series(whole, cut, strain_states(whole), criteria.smooth, criteria.means)
+        changing = paced(self.question.sample, criteria.shown)
+        return cut, discrepancy(stacked, cut.spread(whole.sigma), changing, at_once=True, smooth=criteria.smooth)
 
     def finished(self, found: Answered) -> Diagnosis:
         """See `Recorded.finished`; what the fitted recordings leave open in the others is said too."""

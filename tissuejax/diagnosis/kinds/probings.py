@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from tissuejax.diagnosis.judgement.answer import Answered
 from tissuejax.diagnosis.judgement.blocks import Blocks
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.judgement.judge import Kind
 from tissuejax.diagnosis.kinds.recorded import Question, Recorded
 from tissuejax.diagnosis.known import tell
@@ -52,13 +52,15 @@ class Probings(Recorded):
         left_out: list[str] = []
         for bench in (own, narrow):
             tell(bench, q.known)
-            bench.candidates, left_out = pressed(own.segments, bench.candidates, q.effects)
-        return cls(question, ProbingView.of(narrow), ProbingView.of(own), PROBING, left_out)
+            bench.candidates, left_out = pressed(own.segments, bench.candidates, q.effects, q.criteria.shown)
+        simulated, peak = q.criteria.simulated, q.criteria.means.peak
+        views = (ProbingView.of(bench, simulated, peak) for bench in (narrow, own))
+        return cls(question, *views, PROBING, left_out)
 
     def left(self) -> tuple[Blocks, Discrepancy]:
         """See `Recorded.left`."""
         cut = probing_blocks(self.whole)
-        return cut, probing_discrepancy(self.whole, cut)
+        return cut, probing_discrepancy(self.whole, cut, self.question.criteria.smooth)
 
     def finished(self, found: Answered) -> Diagnosis:
         """See `Recorded.finished`; each planned press is a simulation. With maps of where tissue should be stiffer."""

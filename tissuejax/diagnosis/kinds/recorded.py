@@ -9,7 +9,8 @@ from typing import ClassVar
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.judgement.answer import Answered
 from tissuejax.diagnosis.judgement.blocks import Blocks
-from tissuejax.diagnosis.judgement.explore import Effort
+from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.known import Known, effects_of
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.energies.energy import Energy
@@ -29,6 +30,7 @@ class Question:
         known: physics that the base has already.
         effects: names of the effects to try, None for all; known ones left out.
         keep: folder for finished simulations.
+        criteria: the numbers that make a verdict.
     """
 
     sample: Sample
@@ -39,6 +41,7 @@ class Question:
     known: Known
     effects: Sequence[str] | None
     keep: Path | None
+    criteria: Criteria = field(default_factory=Criteria)
 
     @property
     def every(self) -> tuple[str, ...]:

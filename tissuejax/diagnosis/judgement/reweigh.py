@@ -1,0 +1,140 @@
+"""Sets that a search has found, weighed again under other criteria from where they came to rest: no search.
+
+Parameters and amplitudes of the discrepancy begin where the search left them, so a set costs a few predictions and one
+derivative. That says what a number does to the weight of sets; what else a search would have tried says only a search.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tissuejax.diagnosis.bench import Bench
+from tissuejax.diagnosis.judgement.blocks import Blocks
+from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.effort import Course, Effort
+from tissuejax.diagnosis.judgement.evidence import Evidence
+from tissuejax.diagnosis.judgement.explore import Exploration
+from tissuejax.diagnosis.judgement.judge import left, log_prior
+from tissuejax.diagnosis.judgement.kept import Kept
+from tissuejax.diagnosis.judgement.scales import Scales
+from tissuejax.diagnosis.judgement.search import based, rooted
+from tissuejax.diagnosis.judgement.sudden import joined, scanned
+from tissuejax.diagnosis.judgement.weigh import Start, Weighed, weigh
+from tissuejax.errors import InputError
+from tissuejax.estimation.discrepancy import Discrepancy
+
+
+@dataclass(frozen=True)
+class Rested:
+    """Where one set came to rest.
+
+    Attributes:
+        keys: candidates in the set.
+        values: its parameters.
+        v: squared amplitudes of the discrepancy.
+        begun: values at which it began, by which the priors of its amplitudes go.
+    """
+
+    keys: tuple[str, ...]
+    values: Mapping[str, float]
+    v: tuple[float, ...]
+    begun: Mapping[str, float]
+
+    @classmethod
+    def of(cls, w: Weighed) -> "Rested":
+        """Of a set that was weighed."""
+        return cls(w.evidence.keys, dict(w.refit.values), tuple(w.v.tolist()), dict(w.begun))
+
+    def start(self, parts: int | None = None) -> Start:
+        """From there; with the amplitudes of the first `parts` alone."""
+        return Start(dict(self.begun), np.array(self.v[:parts]), at=dict(self.values))
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a finished search leaves to be weighed again, as plain numbers.
+
+    Attributes:
+        sets: where sets came to rest, the base first.
+        moments: names of what may have happened at once, as they came in.
+        held_out: recordings so called.
+    """
+
+    sets: tuple[Rested, ...]
+    moments: tuple[str, ...] = ()
+    held_out: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, e: Exploration, held_out: Sequence[str] = (), near: float = 12.0, most: int = 25) -> "Found":
+        """The base and those sets that the criteria may bring to the top.
+
+        Args:
+            near: nats of `judge`'s weight below the best up to which sets are kept; most: how many at most.
+        """
+        c, usable = e.criteria, [w for w in e.weighed.values() if math.isfinite(w.evidence.log_evidence)]
+        best = max((w.evidence for w in usable), key=lambda s: s.log_evidence)
+        power = c.power(best.n, left(best))
+        weight = {w.evidence.keys: power * w.evidence.log_evidence + log_prior(w.evidence, e.forms, c) for w in usable}
+        top = max(weight.values())
+        ranked = sorted(usable, key=lambda w: -weight[w.evidence.keys])
+        kept = [w for w in ranked if w.evidence.keys and weight[w.evidence.keys] > top - near][:most]
+        of = e.scales.discrepancy
+        moments = tuple(m.name for m in of.sudden) if isinstance(of, Discrepancy) else ()
+        return cls(tuple(Rested.of(w) for w in (e.weighed[frozenset()], *kept)), moments, tuple(held_out))
+
+    def as_dict(self) -> dict:
+        """For a file."""
+        return dataclasses.asdict(self)
+
+    @classmethod
+    def read(cls, given: Mapping) -> "Found":
+        """From `as_dict`."""
+        sets = tuple(Rested(tuple(s["keys"]), s["values"], tuple(s["v"]), s["begun"]) for s in given["sets"])
+        return cls(sets, tuple(given["moments"]), tuple(given["held_out"]))
+
+
+def reweighed(
+    bench: Bench, cut: Blocks, of: Discrepancy, found: Found, criteria: Criteria, effort: Effort | None = None
+) -> Evidence:
+    """The evidence of the sets of `found` under these criteria.
+
+    Args:
+        bench: with all recordings fitted; cut, of: as `criteria` have them.
+        effort: how far each fit is followed from where it was; two rounds by default.
+
+    Raises:
+        InputError: a set that this bench does not offer, or moments that are no longer scanned.
+    """
+    if missing := sorted({k for s in found.sets for k in s.keys} - set(bench.candidates)):
+        raise InputError(f"{', '.join(missing)}: not offered for these recordings now; search again")
+    effort = effort or Effort(rounds=2)
+    course = replace(effort.course, rounds=effort.rounds, iterations=effort.iterations)
+    base, *others = found.sets
+    # what happened at once comes in last: it begins beside the base with all else
+    start = base.start(len(base.v) - len(found.moments))
+    scales, _ = based(bench, cut, of, criteria, replace(effort, course=course), Kept(), start)
+    known = {m.name: m for m in scanned(scales)} if found.moments else {}
+    for name in found.moments:
+        if name not in known:
+            raise InputError(f"{name}: no longer one of the moments that are scanned; search again")
+        scales = joined(scales, known[name])
+    first = _followed(scales, base, criteria, course)
+    rooted(scales, first, bench.free)
+    sets = [first.evidence]
+    for s in others:
+        sets.append(_followed(scales, s, criteria, course).evidence)
+    names = [c.name for c in bench.candidates.values()]
+    forms = {n: names.count(n) for n in dict.fromkeys(names)}
+    fitted = tuple(n for n in bench.fitted if n not in found.held_out)
+    return Evidence(tuple(sets), forms, fitted, found.held_out)
+
+
+def _followed(scales: Scales, s: Rested, criteria: Criteria, course: Course) -> Weighed:
+    """A set where it rests, and from there on; the better of both, as a search keeps it. The first fit of a set leaves
+    out what laws of effects err by, and may lead away from there."""
+    still = replace(course, rounds=1, iterations=0)
+    tried = [weigh(scales, s.keys, s.start(), criteria, c) for c in (still, course)]
+    return max(tried, key=lambda w: w.evidence.log_evidence)

@@ -1,0 +1,46 @@
+"""The lengths and times over which a discrepancy is smooth, with unit, meaning and ground of each."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Smoothness:
+    """Over which lengths and times what a model leaves of real recordings is smooth.
+
+    Attributes:
+        law: correlation lengths of what a law lacks, shares of the range of strain (probings: of the depth). Ground:
+            half of the range is a bend of the whole curve, as one term more of a series would make it; an eighth a toe
+            or a knee. Lengths between are mixtures of the two.
+        turning: correlation length of hysteresis, a share of the range of strain. Ground: a loop's width changes along
+            a cycle a few times at most.
+        states: path over which the loading state turns where a drive turns round, shares of the range. Ground: a step
+            (friction of the rig), rounded loops of tissue, and such as never close; a factor of five apart.
+        slow: correlation times of what wanders, shares of a recording's duration. Ground: from a drift of the whole
+            recording to what a twentieth of it is needed to see; quicker is scatter.
+        begun: share of a recording's duration up to which time is counted, beyond it its logarithm. Ground: laws of
+            relaxation err over decades, and fewer than two lie within a recording of some hundred samples.
+        waning: correlation time of a gain, a share of a recording's duration. Ground: stiffness that comes and goes
+            does so once in a recording; quicker is what wanders.
+        band: tremble of a drive that is no turn, a share of its range. Ground: a drive under control is held to that.
+        clock: by what share of a recording's duration a clock jumps where the stress would by its peak. Ground: a
+            third is as far as a recorder skips unnoticed.
+        edge: means of samples at either end of a recording that show no step. Ground: fewer than three can't be told
+            from noise.
+        moments: times in a recording that are asked whether something happened there, at most. Ground: cost; one in
+            two means of samples.
+    """
+
+    law: Mapping[str, float] = field(default_factory=lambda: {"law": 0.5, "fine law": 0.12})
+    turning: float = 0.4
+    states: Mapping[str, float] = field(default_factory=lambda: {"step": 0.01, "narrow": 0.06, "wide": 0.3})
+    slow: Mapping[str, float] = field(default_factory=lambda: {"quick": 0.05, "slow": 0.25, "lasting": 1.5})
+    begun: float = 0.01
+    waning: float = 0.5
+    band: float = 0.005
+    clock: float = 0.3
+    edge: int = 3
+    moments: int = 40
+
+
+USUAL = Smoothness()
