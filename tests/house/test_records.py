@@ -18,7 +18,10 @@ from tissuejax.estimation.smoothness import Smoothness
 RECORDS = (Criteria, Course, Effort, Means, Shown, Simulated, Smoothness, Strokes)
 ROOMS = [
     *sorted((ROOT / "diagnosis" / "judgement").glob("*.py")),
-    *(ROOT / "diagnosis" / f"{name}.py" for name in ("offered", "starts", "probing_view", "probing_slopes")),
+    *(
+        ROOT / "diagnosis" / f"{name}.py"
+        for name in ("offered", "probing_offered", "starts", "probing_view", "probing_slopes")
+    ),
     *(ROOT / "diagnosis" / f"{name}.py" for name in ("probing_discrepancy", "cutting_discrepancy")),
     *(ROOT / "estimation" / f"{name}.py" for name in ("discrepancy", "sudden", "smoothness")),
 ]
