@@ -19,10 +19,10 @@ import jax
 from tissuejax.cache.programs import own
 
 ENVIRONMENT = "TISSUEJAX_NATIVE"
-FLAGS = ("-O2", "-ftree-vectorize", "-march=native", "-std=gnu11", "-shared", "-fPIC", "-fopenmp-simd",
-         "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fno-tree-pre", "-w")  # fmt: skip
 # compilers take half of an AVX-512 register unless told: a fifth (float32) to a third (float64) of a step
 WIDE = ("-mprefer-vector-width=512",) if platform.machine().lower() in ("x86_64", "amd64") else ()
+FLAGS = ("-O2", "-ftree-vectorize", "-march=native", "-std=gnu11", "-shared", "-fPIC", "-fopenmp-simd",
+         "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fno-tree-pre", "-w", *WIDE)  # fmt: skip
 VECTOR_MATH = ('-DSIMD=__attribute__((__simd__("notinbranch"),const))', "-lmvec")  # glibc's, where it has them
 KEPT = "native"  # subfolder of the programs that are kept
 
@@ -52,7 +52,7 @@ def _around() -> str:
         flags = next((line for line in seen.splitlines() if line.startswith(("flags", "Features"))), "")
     except OSError:
         flags = platform.processor()
-    return "\n".join((output, flags, platform.machine(), jax.__version__, " ".join((*FLAGS, *WIDE, *VECTOR_MATH))))
+    return "\n".join((output, flags, platform.machine(), jax.__version__, " ".join((*FLAGS, *VECTOR_MATH))))
 
 
 def named(text: str) -> str:
@@ -89,7 +89,7 @@ def _compiled(text: str, name: str, kept: Path | None) -> ctypes.CDLL:
         include = f"-I{jax.ffi.include_dir()}"
         output = ""
         for extra in (VECTOR_MATH, ()):
-            command = [str(compiler()), *FLAGS, *WIDE, include, str(source), "-o", str(made), *extra, "-lm", "-Wl,-z,defs"]
+            command = [str(compiler()), *FLAGS, include, str(source), "-o", str(made), *extra, "-lm", "-Wl,-z,defs"]
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             found = _load(made) if done.returncode == 0 else None
             if found is not None:
