@@ -5,8 +5,8 @@ result is the same to the last bit whoever computed which. XLA's pool is asked t
 come free: the caller takes what no one has begun, so that a pool that is busy costs nothing but the asking. Where
 the caller waited for a helper longer than it worked itself (cores that others use), it works alone for `PATIENCE` times
 as long: waits in vain are a fiftieth of a run at most.
-Nothing is shared under OMP_NUM_THREADS=1 or XLA_FLAGS=--xla_cpu_multi_thread_eigen=false, as both were when a loop first
-ran, nor on one core.
+Nothing is shared under OMP_NUM_THREADS=1 or XLA_FLAGS=--xla_cpu_multi_thread_eigen=false (what a loop found when it
+first ran), nor on one core.
 """
 
 from collections.abc import Sequence
@@ -22,19 +22,24 @@ def parts(elements: int) -> int:
     return PARTS if elements >= SHARED else 1
 
 
-def handler(inputs: int, outputs: int, sizes: Sequence[str], nodes: str, batch: str, width: int) -> str:
+def handler(inputs: int, outputs: Sequence[tuple[str, int]], nodes: str, batch: str, corners: int, width: int) -> str:
     """The C that XLA calls, to stand after `run`.
 
     Args:
         inputs: arguments with the cells.
-        outputs: results; one more is given where there are parts, room for their sums: (parts - 1, numbers).
-        sizes: C of how many numbers of each result are summed; 0 where each element has its own.
+        outputs: kind and rows of each result (`write.Slot`); one more is given where there are parts, room for their
+            sums: (parts - 1, numbers).
         nodes, batch: C of the sizes N and B.
+        corners: nodes of an element.
         width: elements of a block.
     """
-    given = {"inputs": inputs, "outputs": outputs, "nodes": nodes, "batch": batch, "width": width}
-    summed = "".join(f"  size[{i}] = {size};\n" for i, size in enumerate(sizes))
-    return HANDLER.substitute(given, sizes=summed, patience=PATIENCE)
+    given = {"inputs": inputs, "outputs": len(outputs), "nodes": nodes, "batch": batch, "corners": corners}
+    length = {"nodal": "N", "uniform": "1", "lane": "0"}
+    sizes = "".join(
+        f"  rows[{i}] = {f'B * {rows}' if kind != 'lane' else 0}, length[{i}] = {length[kind]};\n"
+        for i, (kind, rows) in enumerate(outputs)
+    )
+    return HANDLER.substitute(given, sizes=sizes, width=width, parts=PARTS, patience=PATIENCE)
 
 
 HANDLER = Template("""
@@ -47,35 +52,50 @@ HANDLER = Template("""
 #else
 #define PAUSE ((void)0)
 #endif
-enum { INPUTS = $inputs, OUTPUTS = $outputs, WIDTH = $width };
+enum { INPUTS = $inputs, OUTPUTS = $outputs, CORNERS = $corners, WIDTH = $width, PARTS = $parts };
 
 typedef struct {
   const void *in[INPUTS];
   void *out[OUTPUTS];
   real *spare;
-  int64_t E, N, B, parts, next, done, held;
+  int64_t E, N, B, parts, next, done, held, low[PARTS], high[PARTS];
 } Work;
 
 int64_t helped = 0; /* parts that another thread than the caller's computed */
 static double alone = 0; /* until when no help is asked for, s */
 
-static int64_t sizes(const Work *w, int64_t *size) {
+/* Of the sums: rows of how many numbers (0 rows where each element has its own). */
+static void sizes(const Work *w, int64_t *rows, int64_t *length) {
   const int64_t N = w->N, B = w->B;
-  int64_t all = 0;
-$sizes  for (int i = 0; i < OUTPUTS; i++) all += size[i];
-  return all;
-}
+$sizes}
 
-static void part(const Work *w, int64_t p) {
-  int64_t size[OUTPUTS], at = (p - 1) * sizes(w, size);
-  void *out[OUTPUTS];
-  for (int i = 0; i < OUTPUTS; i++) {
-    out[i] = p && size[i] ? w->spare + at : w->out[i];
-    at += size[i];
-  }
+static void part(Work *w, int64_t p) {
+  int64_t rows[OUTPUTS], length[OUTPUTS], room = 0, low = 0, high = w->N;
+  sizes(w, rows, length);
+  for (int i = 0; i < OUTPUTS; i++) room += rows[i] * length[i];
   const int64_t blocks = w->E / WIDTH, begin = blocks * p / w->parts * WIDTH;
   const int64_t end = p + 1 == w->parts ? w->E : blocks * (p + 1) / w->parts * WIDTH;
+  if (p) { /* elements that stand together have nodes that do: the others' sums are left alone */
+    const int32_t *cells = w->in[0];
+    int32_t least = INT32_MAX, most = -1;
+    for (int64_t a = 0; a < CORNERS; a++)
+#pragma omp simd reduction(min : least) reduction(max : most)
+      for (int64_t e = a * w->E + begin; e < a * w->E + end; e++) {
+        least = cells[e] < least ? cells[e] : least;
+        most = cells[e] > most ? cells[e] : most;
+      }
+    low = least, high = (int64_t)most + 1;
+  }
+  void *out[OUTPUTS];
+  real *own = p ? w->spare + (p - 1) * room : NULL;
+  for (int i = 0; i < OUTPUTS; i++) {
+    out[i] = p && rows[i] ? own : w->out[i];
+    const int64_t from = length[i] > 1 ? low : 0, to = length[i] > 1 ? high : length[i];
+    for (int64_t r = 0; r < rows[i]; r++) memset((real *)out[i] + r * length[i] + from, 0, (to - from) * sizeof(real));
+    if (p) own += rows[i] * length[i];
+  }
   run(w->in, out, w->E, w->N, w->B, begin, end);
+  w->low[p] = low, w->high[p] = high;
 }
 
 static int64_t taken(Work *w) {
@@ -89,15 +109,16 @@ static int64_t taken(Work *w) {
 }
 
 static void added(const Work *w) {
-  int64_t size[OUTPUTS];
-  const int64_t all = sizes(w, size);
-  for (int64_t p = 1; p < w->parts; p++) {
-    const real *from = w->spare + (p - 1) * all;
-    for (int i = 0; i < OUTPUTS; from += size[i++]) {
+  int64_t rows[OUTPUTS], length[OUTPUTS];
+  sizes(w, rows, length);
+  const real *from = w->spare;
+  for (int64_t p = 1; p < w->parts; p++)
+    for (int i = 0; i < OUTPUTS; i++) {
       real *to = w->out[i];
-      for (int64_t j = 0; j < size[i]; j++) to[j] += from[j];
+      const int64_t begin = length[i] > 1 ? w->low[p] : 0, end = length[i] > 1 ? w->high[p] : length[i];
+      for (int64_t r = 0; r < rows[i]; r++, to += length[i], from += length[i])
+        for (int64_t j = begin; j < end; j++) to[j] += from[j];
     }
-  }
 }
 
 static void left(Work *w) {

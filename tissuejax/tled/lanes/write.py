@@ -157,8 +157,8 @@ class _Writer:
     def _handler(self) -> str:
         batched = next((i for i, s in enumerate(self.ins) if s.batched), None)
         batch = "1" if batched is None else f"buffer(frame->args.args[{batched + 1}])->dims[0]"
-        sizes = [{"nodal": f"B * {s.rows} * N", "uniform": f"B * {s.rows}", "lane": "0"}[s.kind] for s in self.outs]
-        return handler(len(self.ins) + 1, len(self.outs), sizes, self._nodes(), batch, self.width)
+        outs = [(s.kind, s.rows) for s in self.outs]
+        return handler(len(self.ins) + 1, outs, self._nodes(), batch, self.corners, self.width)
 
     def _nodes(self) -> str:
         for of, slots in (("args.args", self.ins), ("rets.rets", self.outs)):
@@ -177,14 +177,7 @@ class _Writer:
                     if id(node) in self.names:
                         lines.append(f"const real {self.names[id(node)]} = in{i}[{r}];")
         lines += [self.statement(n) for n in self.order if n.level == UNIFORM and n.op != "input"]
-        many = "B * " if self.batch else ""
-        for i, slot in enumerate(self.outs):
-            lines.append(f"real *const out{i} = out[{i}];")
-            if slot.kind == "nodal":
-                lines.append(f"for (int64_t i = 0; i < {many}{slot.rows} * N; i++) out{i}[i] = 0;")
-            if slot.kind == "uniform":
-                lines.append(f"for (int64_t i = 0; i < {many}{slot.rows}; i++) out{i}[i] = 0;")
-        return lines
+        return lines + [f"real *const out{i} = out[{i}];" for i in range(len(self.outs))]  # sums begin at 0
 
     def _loads(self, batched: bool) -> tuple[list[str], list[str]]:
         """Lines before and inside a vector loop that bring in its arguments."""
