@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from bench_step import machine
 from scipy.optimize import least_squares
 
 import tissuejax as tj
@@ -135,7 +136,7 @@ def main() -> dict:
             f"{name:<56} SSE {row['sse_MPa2'] or float('nan'):.4f} MPa^2  {row['evaluations']:>6} "
             f"evaluations{tangents}  {row['seconds']:.2f} s"
         )
-    write_json(Path(__file__).parent / "results" / "fit.json", rows)
+    write_json(Path(__file__).parent / "results" / "fit.json", rows | {"machine": machine()})
     return rows
 
 

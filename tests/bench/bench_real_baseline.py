@@ -17,6 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from bench_step import machine
 from scipy.optimize import least_squares
 
 import tissuejax as tj
@@ -216,7 +217,7 @@ def main(wanted: list[str]) -> None:
             )
             kept = {(r["set"], r["law"]): r for r in (json.loads(path.read_text())["rows"] if path.exists() else [])}
             kept.update({(r["set"], r["law"]): r for r in rows})  # a part that is run again replaces its own rows
-            write_json(path, {"aim": WORSE, "starts": STARTS, "rows": list(kept.values())})
+            write_json(path, {"aim": WORSE, "starts": STARTS, "rows": list(kept.values()), "machine": machine()})
     ratios = np.array([r["ratio"] for r in rows])
     print(f"\n{np.sum(ratios <= WORSE)} of {len(rows)} at most {WORSE}; largest ratio {ratios.max():.3f}")
 

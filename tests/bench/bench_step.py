@@ -8,6 +8,7 @@ their ratio least.
 "bent" is the same cube taken for general hexes, as bodies from a point cloud are.
 """
 
+import functools
 import json
 import os
 import platform
@@ -19,6 +20,7 @@ from pathlib import Path
 import jax
 import jax.numpy as jnp
 import numpy as np
+import yardstick
 
 from tissuejax.energies.reduced_polynomial import ReducedPolynomial
 from tissuejax.energies.volumetric import Quadratic
@@ -76,9 +78,20 @@ def model() -> str:
         return platform.processor() or platform.machine()
 
 
+@functools.cache
+def can() -> dict | None:
+    """`yardstick.measure` and the step written by hand of 1,000 hexes, once a run; None where no C compiler is."""
+    told, steps = yardstick.measure(), 500
+    for precision, figures in (told or {}).items():
+        hand = yardstick.Hand(cube(10, 4, jnp.dtype(precision).type, steps=50), precision)
+        spent = yardstick.seconds(lambda: (hand.rest(), hand.run(steps)))  # noqa: B023
+        figures["step written by hand, ns a hex"] = round(spent / (steps * 1000) * 1e9, 1)
+    return told
+
+
 def machine() -> dict:
-    """Where the figures come from."""
-    return {"processor": model(), "jax": jax.__version__, "load": os.getloadavg()[0]}
+    """Where the figures come from, and what that processor can do, measured in the same run: what they stand beside."""
+    return {"processor": model(), "jax": jax.__version__, "load": os.getloadavg()[0], "yardstick": can()}
 
 
 def write(name: str, figures: dict) -> None:

@@ -1,12 +1,14 @@
-"""What this processor can do, measured in the same run as our own figures: they stand beside it as ratios.
+"""What this processor can do, measured in the same run as our own figures, which stand beside it.
 
 `yardstick.c` (ours) is compiled twice where a C compiler is. `measure()` gives the bandwidth of a triad in a core's
-cache and in memory (GB/s), the rate of fused multiply-adds (1e9/s), and the hand-written hex step (ns an element and
-step). CPU time of this thread, the best of several. Where there is no compiler, `library` is None and ratios are left
-out. `bench_yardstick.py` sets ours beside it and says how far the two displacements are apart.
+cache and in memory (GB/s) and the rate of fused multiply-adds (1e9/s), `Hand` is the hand-written hex step. CPU time of
+this thread, the best of several. Where there is no compiler, `library` and `measure` give None. Every benchmark writes
+all of it beside its figures (`bench_step.machine`); `bench_yardstick.py` takes our step and the hand-written one in
+turns and says how far the two displacements are apart.
 """
 
 import ctypes
+import functools
 import shutil
 import subprocess
 import tempfile
@@ -25,6 +27,7 @@ KINDS = {"float32": ("float", np.float32, ctypes.c_float), "float64": ("double",
 LAW = ("C10", "C20", "C30", "C40")
 
 
+@functools.cache
 def library(precision: str) -> ctypes.CDLL | None:
     """The compiled yardstick, or None where no compiler is."""
     compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")

@@ -6,7 +6,7 @@ operations a block costs a call: the step takes 2.8 to 4.6 times what a hand-wri
 a core with AVX-512). The same traced formula, written out as C, takes 1.6 to 1.9 times as much, and a probing's fit
 (p01) 0.64 of the CPU time with everything compiled anew, 0.52 with programs kept. Energies are still written once, as
 energies: the C is made from what JAX traced of the element, derivatives included; an operation that has no form in C
-leaves its loop to XLA.
+leaves its loop to XLA. Long loops are shared by two threads, to the same bits as on one (`lanes/share.py`).
 """
 
 import dataclasses

@@ -20,6 +20,7 @@ from jax.extend import core
 from jax.interpreters import ad, batching, mlir
 
 from tissuejax.tled.lanes.library import NotCompiled, named
+from tissuejax.tled.lanes.share import parts
 from tissuejax.tled.lanes.tape import BATCH, LANE, UNIFORM, Tape
 from tissuejax.tled.lanes.walk import Untold, walk
 from tissuejax.tled.lanes.write import WIDTH, Slot, written
@@ -162,7 +163,11 @@ def _call(cells, *arguments, kernel: Kernel, batched, count: int):
     except (Untold, NotCompiled):  # a derivative may have operations that the function has not
         return plain(cells, *arguments, kernel=kernel, batched=batched, count=count)
     avals = _avals(kernel, batched, count, cells, arguments)
-    return jax.ffi.ffi_call(name, avals)(cells.astype(jnp.int32), *arguments)  # 32 bits are what the program reads
+    more = parts(cells.shape[-1]) - 1
+    room = sum(a.size for a, s in zip(avals, kernel.outs, strict=True) if s.kind != "lane")
+    spare = [jax.ShapeDtypeStruct((more, room), avals[0].dtype)] if more else []
+    # 32 bits are what the program reads
+    return jax.ffi.ffi_call(name, [*avals, *spare])(cells.astype(jnp.int32), *arguments)[: len(avals)]
 
 
 def plain(cells, *arguments, kernel: Kernel, batched, count: int) -> list[Any]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tissuejax.tled.lanes.share import handler
 from tissuejax.tled.lanes.tape import BATCH, LANE, UNIFORM, Node, Number
 
 WIDTH = 32
@@ -149,16 +150,15 @@ class _Writer:
             two = ", real" if op in TWO else ""
             declared.append(f"{'SIMD ' if op in VECTOR + OTHER else ''}real {op}{self.f}(real{two});")
         top = TOP.format(real=self.real, f=self.f, functions="\n".join(declared))
-        head = "void run(const void *const *in, void *const *out, const int64_t E, const int64_t N, const int64_t B) {"
-        return top + "\n".join([head, *("  " + line for line in body), "}"]) + "\n" + HANDLER.format(**self._sizes())
+        head = "static void run(const void *const *in, void *const *out, const int64_t E, const int64_t N,\n"
+        head += "                const int64_t B, const int64_t begin, const int64_t end) {"
+        return top + "\n".join([head, *("  " + line for line in body), "}"]) + "\n" + self._handler()
 
-    def _sizes(self) -> dict:
+    def _handler(self) -> str:
         batched = next((i for i, s in enumerate(self.ins) if s.batched), None)
-        return {
-            "inputs": len(self.ins) + 1, "outputs": len(self.outs),
-            "nodes": self._nodes(),
-            "batch": "1" if batched is None else f"buffer(frame->args.args[{batched + 1}])->dims[0]",
-        }  # fmt: skip
+        batch = "1" if batched is None else f"buffer(frame->args.args[{batched + 1}])->dims[0]"
+        outs = [(s.kind, s.rows) for s in self.outs]
+        return handler(len(self.ins) + 1, outs, self._nodes(), batch, self.corners, self.width)
 
     def _nodes(self) -> str:
         for of, slots in (("args.args", self.ins), ("rets.rets", self.outs)):
@@ -177,14 +177,7 @@ class _Writer:
                     if id(node) in self.names:
                         lines.append(f"const real {self.names[id(node)]} = in{i}[{r}];")
         lines += [self.statement(n) for n in self.order if n.level == UNIFORM and n.op != "input"]
-        many = "B * " if self.batch else ""
-        for i, slot in enumerate(self.outs):
-            lines.append(f"real *const out{i} = out[{i}];")
-            if slot.kind == "nodal":
-                lines.append(f"for (int64_t i = 0; i < {many}{slot.rows} * N; i++) out{i}[i] = 0;")
-            if slot.kind == "uniform":
-                lines.append(f"for (int64_t i = 0; i < {many}{slot.rows}; i++) out{i}[i] = 0;")
-        return lines
+        return lines + [f"real *const out{i} = out[{i}];" for i in range(len(self.outs))]  # sums begin at 0
 
     def _loads(self, batched: bool) -> tuple[list[str], list[str]]:
         """Lines before and inside a vector loop that bring in its arguments."""
@@ -215,8 +208,8 @@ class _Writer:
             f"real sum{i}[{s.rows}][{self.width}] = {{{{0}}}};" for i, s in enumerate(self.outs) if s.kind == "uniform"
         ]
         lines = [] if self.batch else sums
-        lines += [f"for (int64_t first = 0; first < E; first += {self.width}) {{"]
-        lines += [f"  const int64_t e = first + {self.width} > E ? E - {self.width} : first;"]
+        lines += [f"for (int64_t first = begin; first < end; first += {self.width}) {{"]
+        lines += [f"  const int64_t e = first + {self.width} > end ? end - {self.width} : first;"]
         lines += ["  const int done = (int)(first - e);"]
         before, inside = self._loads(False)
         work = [self.statement(n) for n in self.order if n.level == LANE and n.op != "input"]
@@ -264,6 +257,7 @@ class _Writer:
         if not nodal:
             return []
         lines += [f"for (int i = done; i < {self.width}; i++) {{"]
+        lines += [f"#pragma GCC unroll {k}"]  # 4 to 17 % of a loop
         lines += [f"  for (int a = 0; a < {k}; a++) {{", "    const int64_t at = cells[a * E + e + i];"]
         for i, slot in nodal:
             lines += [f"    out{i}[({b} * {slot.rows} + {c}) * N + at] += o{i}[{c * k} + a][i];"
@@ -277,25 +271,3 @@ class _Writer:
                 lines.append(f"for (int r = 0; r < {slot.rows}; r++)")
                 lines.append(f"  for (int i = 0; i < {self.width}; i++) out{i}[{b} * {slot.rows} + r] += sum{i}[r][i];")
         return lines
-
-
-HANDLER = """
-static XLA_FFI_Buffer *buffer(void *p) {{ return (XLA_FFI_Buffer *)p; }}
-
-/* What XLA calls. */
-XLA_FFI_Error *handler(XLA_FFI_CallFrame *frame) {{
-  if (frame->extension_start && frame->extension_start->type == XLA_FFI_Extension_Metadata) {{
-    XLA_FFI_Metadata *told = ((XLA_FFI_Metadata_Extension *)frame->extension_start)->metadata;
-    told->api_version.major_version = XLA_FFI_API_MAJOR;
-    told->api_version.minor_version = XLA_FFI_API_MINOR;
-    return NULL;
-  }}
-  const void *in[{inputs}];
-  void *out[{outputs}];
-  for (int i = 0; i < {inputs}; i++) in[i] = buffer(frame->args.args[i])->data;
-  for (int i = 0; i < {outputs}; i++) out[i] = buffer(frame->rets.rets[i])->data;
-  const XLA_FFI_Buffer *cells = buffer(frame->args.args[0]);
-  run(in, out, cells->dims[cells->rank - 1], {nodes}, {batch});
-  return NULL;
-}}
-"""
