@@ -111,5 +111,5 @@ def test_a_loop_of_the_vertical_force_alone_is_hysteresis(presses):
     for part in parts:
         if part.family == "hysteresis":
             depth = np.concatenate([s.drive for s in view.segments])
-            cut = blocks(view, BLOCKS)
+            cut = blocks(view, SIMULATED.means)
             assert np.max(np.abs(part.factor[cut.mean(depth) == 0])) < 1e-12  # none out of contact

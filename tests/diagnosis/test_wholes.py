@@ -11,7 +11,7 @@ from spring_bench import FREE, START, TIME, Spring, spring
 from test_unread import recorded
 
 from tissuejax.diagnosis.bench import Candidate, Free
-from tissuejax.diagnosis.judgement.marginal import Blocked
+from tissuejax.diagnosis.judgement.marginal import Blocked, Linear
 from tissuejax.diagnosis.judgement.weigh import _on_bounds
 from tissuejax.diagnosis.material import MaterialBench
 from tissuejax.diagnosis.misfit import white
@@ -116,7 +116,8 @@ def test_the_evidence_at_the_whole_is_the_mass_inside_it():
     r = rest - slopes[:, free] @ np.linalg.solve(precision, slopes[:, free].T @ rest / sigma**2)
     stub = SimpleNamespace(blocked=Blocked((slice(0, n),), np.full(n, sigma)))
     none = [Part("none", "none", factor=np.zeros((n, 1)))]
-    beside = _on_bounds(stub, none, np.zeros(1), r, slopes, resting, np.zeros(3), np.zeros(3), free, precision)
+    every = Linear(r, slopes, np.zeros(3), np.zeros(3))
+    beside = _on_bounds(stub, none, np.zeros(1), every, resting, free, precision)
     along = np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(precision)[1] - 0.5 * r @ r / sigma**2
     assert along + beside == pytest.approx(inside, abs=1e-9)
     assert inside < whole - 1.0  # it says something
