@@ -1,6 +1,7 @@
 """The page of a diagnosis and its figures, as data, on benches in closed form; drawing is only checked to happen."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -67,6 +68,13 @@ def test_sentences_say_how_sure_and_against_what(relaxing):
     found = re.search(r"misfit over the stated noise: ([\d.]+) .*with .* alone, ([\d.]+) .*with relax", lines)
     assert float(found[1]) > 1.5 > 1.1 > float(found[2]) > 0.9
     assert "second specimen" in sentences.next_steps(relaxing)[0]
+
+
+def test_a_page_says_how_often_evidence_of_simulations_says_nothing(relaxing):
+    answered = relaxing.answered
+    assert not any("Once in" in line for line in judged_sentences.sure(relaxing))
+    few = replace(relaxing, answered=replace(answered, evidence=replace(answered.evidence, simulated=True)))
+    assert sum("Once in 5 a search by few simulations" in line for line in judged_sentences.sure(few)) == 1
 
 
 def test_what_is_unexplained_sends_the_reader_to_the_remainder(stepping):

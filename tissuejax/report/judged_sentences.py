@@ -115,6 +115,12 @@ def sure(d: Diagnosis) -> list[str]:
     a, j, out = d.answered, d.answered.judgement, []
     chances = ", ".join(f"{k.value} {chance(p)}" for k, p in sorted(j.probabilities.items(), key=lambda kv: -kv[1]))
     out.append(f"Probabilities of the five answers: {chances}. The most probable is given.")
+    lapse = a.exploration.criteria.lapse
+    if a.evidence.simulated and lapse > 0:
+        out.append(
+            f"Once in {1 / lapse:.0f} a search by few simulations was wrong in sealed cases. With that probability it "
+            "says nothing here too, and what was held for probable before a recording was seen stands."
+        )
     out += [text] if (text := sentence(d.experiment, a.kind.value)) else []
     present = [f"{n} {chance(p)}" for n, p in j.inclusion.items() if p > 0.01][:6]
     if present:
