@@ -88,12 +88,12 @@ def against(values: dict, key: dict) -> dict:
             "found": {k: [value.get(f"viscoelasticity.{k}{i}") for i in (1, 2)] for k in ("g", "tau")},
         }
     if "breathing" in given:
-        first = [np.hypot(value[f"periodic.sin.{r}"], value[f"periodic.cos.{r}"]) for r in ("r1", "r2", "r3")]
-        second = [np.hypot(value[f"periodic.sin2.{r}"], value[f"periodic.cos2.{r}"]) for r in ("r1", "r2", "r3")]
+        waves = {w: [value[f"support-motion.{w}.{r}"] for r in ("r1", "r2")] for w in ("sin", "cos", "sin2", "cos2")}
+        first, second = np.hypot(waves["sin"], waves["cos"]), np.hypot(waves["sin2"], waves["cos2"])  # r3 is held out
         breath = given["breathing"]
         return {
             "true": {"amplitude": breath["amp"], "second": breath["amp2"], "period": breath["period"]},
-            "found": {"amplitude": first, "second": second, "period": 1 / value["periodic.frequency"]},
+            "found": {"amplitude": first, "second": second, "period": 1 / value["support-motion.frequency"]},
         }
     if "inclusion" in given:
         place = [value[f"inclusion.{c}"] for c in "xyz"]
