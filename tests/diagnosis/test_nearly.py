@@ -5,10 +5,12 @@ import pytest
 
 import tissuejax as tj
 from tissuejax.diagnosis.judgement.blocks import blocks, series
+from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, marginal
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
 from tissuejax.diagnosis.judgement.rest import beyond
 from tissuejax.diagnosis.judgement.scales import Scales, scaled
+from tissuejax.diagnosis.judgement.weigh import Start, weigh
 from tissuejax.diagnosis.material import MaterialBench, strain_states
 from tissuejax.energies.neo_hookean import NeoHookean
 from tissuejax.estimation.discrepancy import Done, Series, discrepancy
@@ -143,8 +145,8 @@ def test_a_relaxation_that_is_over_at_once_does_nothing_and_has_nothing_wrong_wi
 
 
 def test_a_law_errs_by_nothing_that_its_own_constants_could_do():
-    """In units of each block's noise its part lies across the slopes in all that the set frees, and is a projection of
-    the part without them: what is left, and what the slopes do of it, add up to it."""
+    """In units of each block's noise its part lies across the slopes that it is given, and is a projection of the part
+    without them: what is left, and what the slopes do of it, add up to it."""
     scales = relaxed(np.linspace(0.05, 20, 60))
     bench, key = scales.bench, "viscoelasticity/one time"
     values = {**{p: bench.start[p] for p in bench.base}, "effects.viscoelasticity.g1": 0.5}
@@ -159,6 +161,22 @@ def test_a_law_errs_by_nothing_that_its_own_constants_could_do():
     taken = light @ np.linalg.lstsq(light, whole, rcond=None)[0]  # by other algebra than the code's
     np.testing.assert_allclose(across, whole - taken, atol=1e-6 * np.max(np.abs(whole)))
     assert 0.05 < np.linalg.norm(across) / np.linalg.norm(whole) < 0.9  # some of both
+
+
+def test_what_a_fault_of_the_rig_does_is_its_own_and_no_projection_of_what_a_law_errs_by():
+    """Beside a late clock, whose slope has a corner where the ramp ends, a relaxation errs by what it errs by alone."""
+    scales = relaxed(np.linspace(0.05, 20, 60))
+    values = {**{p: scales.bench.start[p] for p in scales.bench.base}, "effects.viscoelasticity.g1": 0.5}
+    values |= {"effects.viscoelasticity.tau1": 3.0, "effects.clock-lag.lag": 0.02}
+    found = weigh(scales, ("viscoelasticity/one time", "clock-lag"), Start(values), Criteria())
+    (part,) = (p.factor for p in found.parts if p.family == "effect")
+    names, noise = tuple(found.refit.values), scales.blocked.sigma[:, None]
+    slopes = scales.cut.mean(scales.bench.jacobian(found.refit.values, names, scales.bench.fitted)) / noise
+    shared = np.linalg.norm((slopes / np.linalg.norm(slopes, axis=0)).T @ (part / noise), axis=1)
+    shared /= np.linalg.norm(part / noise)
+    late = names.index("effects.clock-lag.lag")
+    assert np.all(np.delete(shared, late) < 1e-6)
+    assert shared[late] > 0.01
 
 
 def test_what_the_constants_of_a_set_could_take_up_is_no_rest(rng):

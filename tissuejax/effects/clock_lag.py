@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect, Respond
+from tissuejax.effects.history import delayed
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
@@ -15,8 +16,9 @@ from tissuejax.recordings.recording import Channel
 
 
 class ClockLag(Effect):
-    """In a material test, stress stamped t is that of the stretch at t - lag; in a probing, a marker frame stamped t
-    shows the tissue at t - lag; in a cut, force stamped t is that of the blade at t - lag. Neutral: 0.
+    """In a material test, stress stamped t is that of the stretch at t - lag (`history.delayed`); in a probing, a
+    marker frame stamped t shows the tissue at t - lag; in a cut, force stamped t is that of the blade at t - lag.
+    Neutral: 0.
 
     Revealed by residuals in proportion to the rate of what was done, none in holds: in a probing by markers alone, in a
     cut where the blade enters, turns, and leaves. Blind: recordings at one rate without holds (it then looks like
@@ -45,16 +47,10 @@ class ClockLag(Effect):
     def stretch(
         self, p: Mapping[str, Array], test: MaterialTest, drive: Float[Array, "n ..."], respond: Respond
     ) -> Float[Array, "n ..."]:
-        # from the left: at a sample a lag sees what was before, and before the first one nothing had happened
-        clock = -jnp.concatenate([test.time[:1] - 1.0, test.time])[::-1]
+        def late(x: Float[Array, " n"]) -> Float[Array, " n"]:
+            return delayed(test.time, x, p["lag"]) - delayed(test.time, x, jnp.zeros_like(p["lag"]))
 
-        def at(lag: Array) -> Float[Array, "n ..."]:
-            def one(x: Float[Array, " n"]) -> Float[Array, " n"]:
-                return jnp.interp(lag - test.time, clock, jnp.concatenate([x[:1], x])[::-1])
-
-            return one(drive) if drive.ndim == 1 else jax.vmap(one, 1, 1)(drive)
-
-        return drive + (at(p["lag"]) - at(jnp.zeros_like(p["lag"])))
+        return drive + (late(drive) if drive.ndim == 1 else jax.vmap(late, 1, 1)(drive))
 
     def channels(
         self, p: Mapping[str, Array], test: ProbingTest, channels: Mapping[str, Channel]

@@ -59,7 +59,8 @@ class Scales:
 
         Args:
             keys: effects in the prediction, at `values`; what their laws err by is a part where that is known.
-            slopes: of the prediction, in what the set frees: no law errs by what its own constants could do.
+            slopes: of the prediction, in the constants of the tissue that the set frees: no law errs by what they could
+                do, and what a fault of the rig does is that fault's alone.
         """
         here = np.nan_to_num(self.cut.mean(prediction))
         done = self._done(here, bench, keys, values) if "effect" in self.families else []

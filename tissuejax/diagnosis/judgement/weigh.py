@@ -128,6 +128,7 @@ def weigh(
     course = course or Course()
     names = scales.bench.fitted
     widths = scales.priors(criteria, keys)
+    faults = {p for k in keys if scales.bench.candidates[k].rig for p in scales.bench.candidates[k].paths}
     anew, v = start.v is None, widths.width**2 if start.v is None else start.v
     bench, priors = with_priors(scales, keys, start.values, criteria, start.bench)
     y, best = scales.cut.mean(bench.y), None
@@ -149,14 +150,14 @@ def weigh(
         descent = Descent(bench, misfit, tuple(fit.values), names, {})
         x = descent.point(fit.values)
         resting = descent.resting(x)
-        bound = resting.on
+        bound, own = resting.on, np.array([p not in faults for p in descent.paths])
         raw = scales.cut.mean(bench.jacobian(fit.values, descent.paths, names))
         slopes = resting.along(raw)
         jac = slopes * np.where(descent.log, [fit.values[p] for p in descent.paths], 1.0)
         if not np.isfinite(squared(jac / scales.blocked.sigma[:, None])):
             break  # a prediction without a slope, or with one beyond all numbers: no density is to be had there
         residual = y - scales.cut.mean(fit.prediction)
-        parts = scales.about(fit.prediction, bench, keys, fit.values, slopes[:, ~bound])
+        parts = scales.about(fit.prediction, bench, keys, fit.values, slopes[:, ~bound & own])
         prior = [priors.get(p) for p in descent.paths]
         weak = np.array([0.0 if p is None else p[1] ** -2 for p in prior])
         offset = np.array([0.0 if p is None else a - p[0] for a, p in zip(x, prior, strict=True)])
