@@ -22,6 +22,8 @@ def settings() -> Iterator[tuple[str, Criteria]]:
         yield f"negligible below {negligible}", replace(usual, negligible=negligible)
     for sizes in ((0.25, 0.25, 0.25, 0.25), (0.6, 0.3, 0.08, 0.02), (0.8, 0.18, 0.018, 0.002)):
         yield f"sizes {sizes}", replace(usual, sizes=sizes)
+    for fault in (1.0, 0.3, 0.02):
+        yield f"fault {fault:g}", replace(usual, fault=fault)
     for name in ("unseen", "covered"):
         value = getattr(usual, name)
         for factor in (0.5, 2.0):

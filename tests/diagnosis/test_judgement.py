@@ -1,6 +1,7 @@
 """The judgement: evidence against dense linear algebra, and a verdict that is arithmetic on plain numbers."""
 
 import dataclasses
+import itertools
 import math
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.stats import halfnorm, multivariate_normal
 
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence, SetEvidence, read_evidence, write_evidence
-from tissuejax.diagnosis.judgement.judge import Kind, judge
+from tissuejax.diagnosis.judgement.judge import Beforehand, Kind, judge
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, amplitudes, marginal
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
 from tissuejax.estimation.discrepancy import Part, Series, discrepancy, loading_states
@@ -47,6 +48,32 @@ def test_probabilities_by_hand():
     assert j.inclusion["slack"] == pytest.approx(odds / (1 + odds))
     assert j.kind is Kind.FOUND
     assert j.names == ("slack",)
+
+
+def test_a_fault_of_a_test_machine_is_rarer_by_hand():
+    """Of 0.4 for one effect it has 0.1 / 2.1, of 0.15 for two a pair with it 0.1 / 1.2."""
+    sets = evidence(weighed([], 0.0), weighed(["slack"], 3.0), weighed(["slack", "drift"], 2.0))
+    sets = dataclasses.replace(sets, faults=("slack",))
+    j = judge(sets, Criteria(fault=0.1, coarse=1e12))
+    likely = np.array([0.4, 0.4 * 0.1 / 2.1 * math.exp(3.0), 0.15 * 0.1 / 1.2 / 3 * math.exp(2.0)])
+    likely /= likely.sum()
+    assert j.posterior[""] == pytest.approx(likely[0])
+    assert j.inclusion["slack"] == pytest.approx(likely[1] + likely[2])
+    assert j.inclusion["drift"] == pytest.approx(likely[2])
+
+
+@pytest.mark.parametrize("fault", [0.1, 1.0])
+def test_what_is_held_for_probable_adds_up(fault):
+    """Over all sets that may act, and over those that hold an effect, whatever their odds."""
+    forms = dict.fromkeys("abcde", 1)
+    before = Beforehand.of(forms, ("b", "d"), Criteria(fault=fault))
+    every = [s for k in range(6) for s in itertools.combinations(forms, k)]
+    assert sum(before.exactly(s) for s in every) == pytest.approx(1.0)
+    for some in (("a",), ("b",), ("a", "d"), ()):
+        assert before.with_all(some) == pytest.approx(sum(before.exactly(s) for s in every if set(some) <= set(s)))
+    assert before.exactly(("a",)) * fault == pytest.approx(before.exactly(("b",)))
+    few = Beforehand.of({"a": 1}, (), Criteria())
+    assert few.exactly(()) + few.exactly(("a",)) == pytest.approx(1.0)
 
 
 def test_more_data_of_a_model_that_is_nearly_right_count_less_each_but_never_less_in_all():

@@ -142,6 +142,21 @@ class Bench(abc.ABC):
         """Shapes at which to score a candidate; a bench may read some from the residual (a period, a place)."""
         return candidate.grid
 
+    @property
+    def forms(self) -> dict[str, int]:
+        """In how many forms every effect is offered."""
+        names = [c.name for c in self.candidates.values()]
+        return {n: names.count(n) for n in dict.fromkeys(names)}
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Names of what may be wrong with a test machine, where one made the recordings."""
+        rig = (c.name for c in self.candidates.values() if c.rig and self.machine)
+        return tuple(dict.fromkeys(rig))
+
+    machine: ClassVar[bool] = (
+        False  # whether a test machine made the recordings: its faults are rare (`Criteria.fault`)
+    )
     costly: ClassVar[bool] = False  # whether a prediction costs so much that one is saved where nothing hangs on it
 
     def ahead(self) -> AbstractContextManager[None]:

@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -89,6 +90,8 @@ def lengths(samples: Sequence[int]) -> list[int]:
 
 class MaterialBench(Bench):
     """Material tests of one sample; see `Bench`."""
+
+    machine: ClassVar[bool] = True
 
     @classmethod
     def of(

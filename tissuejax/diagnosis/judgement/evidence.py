@@ -61,6 +61,7 @@ class Evidence:
         sets: every set weighed once, in its best fit.
         forms: by name, how many forms of it were offered (each effect's prior is shared among its forms).
         fitted, held_out: recordings; all of them are measurements for the evidence.
+        faults: names of faults of a test machine among them, which are rarer (`Criteria.fault`).
         exhausted: whether sets were left untried because the budget was spent.
         simulated: whether every prediction is a simulation, so that a search makes few (probings).
     """
@@ -71,6 +72,7 @@ class Evidence:
     held_out: tuple[str, ...]
     exhausted: bool = False
     simulated: bool = False
+    faults: tuple[str, ...] = ()
 
     def as_dict(self) -> dict:
         """For `evidence.json`."""
@@ -97,6 +99,7 @@ def read_evidence(path: Path) -> Evidence:
             tuple(given["held_out"]),
             given["exhausted"],
             given.get("simulated", False),  # unknown to files of before it was asked
+            tuple(given.get("faults", ())),
         )
     except (OSError, KeyError, TypeError, json.JSONDecodeError) as error:
         raise InputError(

@@ -10,6 +10,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
@@ -18,7 +19,7 @@ from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.effort import Course, Effort
 from tissuejax.diagnosis.judgement.evidence import Evidence
-from tissuejax.diagnosis.judgement.judge import log_prior
+from tissuejax.diagnosis.judgement.judge import Beforehand
 from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.scales import Scales, squared
 from tissuejax.diagnosis.judgement.sudden import begun, beside, happened, held, joined
@@ -49,11 +50,10 @@ class Exploration:
     exhausted: bool = False
     kept: Kept = field(default_factory=Kept)
 
-    @property
-    def forms(self) -> dict[str, int]:
-        """How many forms of every effect are offered."""
-        names = [c.name for c in self.bench.candidates.values()]
-        return {n: names.count(n) for n in dict.fromkeys(names)}
+    @cached_property
+    def before(self) -> Beforehand:
+        """What is held for probable before the recordings are seen."""
+        return Beforehand.of(self.bench.forms, self.bench.faults, self.criteria)
 
     def worth(self, key: frozenset) -> float:
         """Log posterior of a weighed set, up to a constant: by all of its evidence, not the power that `judge` takes.
@@ -67,7 +67,7 @@ class Exploration:
         e = w.evidence
         if e.void or not math.isfinite(e.log_evidence):
             return -math.inf
-        return e.log_evidence + log_prior(e, self.forms, self.criteria)
+        return e.log_evidence + self.before.log_prior(e)
 
     def names(self, key: frozenset) -> frozenset:
         """Effects in a set, whatever their form."""
@@ -109,7 +109,8 @@ class Exploration:
     def evidence(self, fitted: tuple[str, ...], held_out: tuple[str, ...]) -> Evidence:
         """All of it as plain numbers."""
         sets = tuple(w.evidence for w in self.weighed.values())
-        return Evidence(sets, self.forms, fitted, held_out, self.exhausted, self.bench.costly)
+        bench = self.bench
+        return Evidence(sets, bench.forms, fitted, held_out, self.exhausted, bench.costly, bench.faults)
 
     def weigh(
         self,
@@ -212,7 +213,7 @@ class Exploration:
         size = np.where(moved > 0, usual * np.sqrt(stress / np.where(moved > 0, moved, 1.0)), 0.0)
         h = (block * size).T @ (block * size)
         price = 0.5 * float(np.linalg.slogdet(np.eye(len(h)) + h)[1])
-        worth = 0.5 * g - price - math.log(self.forms[c.name])
+        worth = 0.5 * g - price + math.log(self.before.odds[c.name] / self.before.forms[c.name])
         return worth, dict(zip(c.amplitudes, step.tolist(), strict=True)), dict(setting), block @ step
 
     def extend(self, parents: Sequence[frozenset], most: int, each: int) -> None:

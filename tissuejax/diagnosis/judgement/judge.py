@@ -19,10 +19,11 @@ and what was held for probable beforehand stands: a mixture, no surer than such 
 
 import enum
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 from scipy.special import logsumexp
 from scipy.stats import norm
 
@@ -85,33 +86,42 @@ class Beforehand:
 
     Attributes:
         sizes: probability that so many effects act.
-        forms: how many effects are offered.
+        odds: of every effect that is offered; in sets of one size the product counts.
+        forms: in how many forms each is offered.
     """
 
     sizes: tuple[float, ...]
-    forms: int
+    odds: Mapping[str, float]
+    forms: Mapping[str, int]
 
     @classmethod
-    def of(cls, forms: int, criteria: Criteria) -> "Beforehand":
-        """With so many effects offered; more than there are can't act."""
-        possible = criteria.sizes[: forms + 1]
-        return cls(tuple(x / sum(possible) for x in possible), forms)
+    def of(cls, forms: Mapping[str, int], faults: Collection[str], criteria: Criteria) -> "Beforehand":
+        """With these effects offered, `faults` of a test machine among them; more than there are can't act."""
+        possible = criteria.sizes[: len(forms) + 1]
+        odds = {n: criteria.fault if n in faults else 1.0 for n in forms}
+        return cls(tuple(x / sum(possible) for x in possible), odds, forms)
 
-    def exactly(self, size: int) -> float:
-        """Probability of one set of so many effects."""
-        return self.sizes[size] / math.comb(self.forms, size) if size < len(self.sizes) else 0.0
+    def exactly(self, names: Collection[str]) -> float:
+        """Probability of a set of effects."""
+        return self._share(names, len(names)) if len(names) < len(self.sizes) else 0.0
 
-    def with_all(self, size: int) -> float:
-        """Probability that these so many effects act, beside whatever others."""
-        of = self.forms
-        return sum(x * math.comb(of - size, k - size) / math.comb(of, k) for k, x in enumerate(self.sizes) if k >= size)
+    def with_all(self, names: Collection[str]) -> float:
+        """Probability that these act, beside whatever others."""
+        return sum(self._share(names, k) for k in range(len(names), len(self.sizes)))
 
+    def log_prior(self, s: SetEvidence) -> float:
+        """Log probability of a set in its forms."""
+        share = self.exactly(s.names)
+        return (math.log(share) if share else -math.inf) - sum(math.log(self.forms[n]) for n in s.names)
 
-def log_prior(s: SetEvidence, forms: Mapping[str, int], criteria: Criteria) -> float:
-    """Log prior probability of a set in these forms."""
-    size = len(s.names)
-    share = criteria.sizes[size] / math.comb(len(forms), size) if size < len(criteria.sizes) else 0.0
-    return (math.log(share) if share else -math.inf) - sum(math.log(forms[n]) for n in s.names)
+    def _share(self, names: Collection[str], size: int) -> float:
+        """Probability that so many act, and these among them."""
+        others = self._products(n for n in self.odds if n not in names)[size - len(names)]
+        return self.sizes[size] * math.prod(self.odds[n] for n in names) * others / self._products(self.odds)[size]
+
+    def _products(self, names: Iterable[str]) -> Float[np.ndarray, " m"]:
+        """Sums of the products of the odds of all sets of 0, 1, 2, ... of these effects."""
+        return np.append(np.poly([-self.odds[n] for n in names]), np.zeros(len(self.sizes)))
 
 
 def negligible(s: SetEvidence, criteria: Criteria) -> float:
@@ -131,9 +141,10 @@ def judge(evidence: Evidence, criteria: Criteria | None = None) -> Judgement:
     criteria = criteria or Criteria()
     usable = [s for s in evidence.sets if not s.void and math.isfinite(s.log_evidence)]
     groups: dict[frozenset, list[tuple[float, SetEvidence]]] = {}
+    before = Beforehand.of(evidence.forms, evidence.faults, criteria)
     power = criteria.power(max(s.n for s in usable), left(max(usable, key=lambda s: s.log_evidence)))
     for s in usable:
-        weight = power * s.log_evidence + log_prior(s, evidence.forms, criteria)
+        weight = power * s.log_evidence + before.log_prior(s)
         groups.setdefault(frozenset(s.names), []).append((weight, s))
     weights = {k: float(logsumexp([w for w, _ in rows])) for k, rows in groups.items()}
     whole = float(logsumexp(list(weights.values())))
@@ -142,16 +153,15 @@ def judge(evidence: Evidence, criteria: Criteria | None = None) -> Judgement:
     empty = frozenset()
     named = [k for k in sound if k != empty]
     lapse = criteria.lapse if evidence.simulated else 0.0
-    before = Beforehand.of(len(evidence.forms), criteria)
 
     def mixed(sound: float, before: float) -> float:
         return (1 - lapse) * sound + lapse * before
 
-    p = {k: mixed(x, before.exactly(len(k))) for k, x in sound.items()}
-    inclusion = {n: mixed(sum(sound[k] for k in named if n in k), before.with_all(1)) for n in evidence.forms}
+    p = {k: mixed(x, before.exactly(k)) for k, x in sound.items()}
+    inclusion = {n: mixed(sum(sound[k] for k in named if n in k), before.with_all((n,))) for n in evidence.forms}
     stated = frozenset(n for n, x in inclusion.items() if x > criteria.named)
-    something = mixed(sum(sound[k] for k in named), 1 - before.exactly(0))
-    with_them = mixed(sum(sound[k] for k in named if stated <= k), before.with_all(len(stated))) if stated else 0.0
+    something = mixed(sum(sound[k] for k in named), 1 - before.exactly(()))
+    with_them = mixed(sum(sound[k] for k in named if stated <= k), before.with_all(stated)) if stated else 0.0
     quiet = {k: negligible(best[k], criteria) for k in p}
     exact = p.get(stated, 0.0) if stated else 0.0
     chances = {

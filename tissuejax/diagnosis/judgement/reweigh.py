@@ -17,7 +17,7 @@ from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.effort import Course, Effort
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.explore import Exploration
-from tissuejax.diagnosis.judgement.judge import left, log_prior
+from tissuejax.diagnosis.judgement.judge import left
 from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.scales import Scales
 from tissuejax.diagnosis.judgement.search import based, rooted
@@ -77,7 +77,7 @@ class Found:
         c, usable = e.criteria, [w for w in e.weighed.values() if math.isfinite(w.evidence.log_evidence)]
         best = max((w.evidence for w in usable), key=lambda s: s.log_evidence)
         power = c.power(best.n, left(best))
-        weight = {w.evidence.keys: power * w.evidence.log_evidence + log_prior(w.evidence, e.forms, c) for w in usable}
+        weight = {w.evidence.keys: power * w.evidence.log_evidence + e.before.log_prior(w.evidence) for w in usable}
         top = max(weight.values())
         ranked = sorted(usable, key=lambda w: -weight[w.evidence.keys])
         kept = [w for w in ranked if w.evidence.keys and weight[w.evidence.keys] > top - near][:most]
@@ -126,10 +126,8 @@ def reweighed(
     sets = [first.evidence]
     for s in others:
         sets.append(_followed(scales, s, criteria, course).evidence)
-    names = [c.name for c in bench.candidates.values()]
-    forms = {n: names.count(n) for n in dict.fromkeys(names)}
     fitted = tuple(n for n in bench.fitted if n not in found.held_out)
-    return Evidence(tuple(sets), forms, fitted, found.held_out)
+    return Evidence(tuple(sets), bench.forms, fitted, found.held_out, faults=bench.faults)
 
 
 def _followed(scales: Scales, s: Rested, criteria: Criteria, course: Course) -> Weighed:
