@@ -8,6 +8,7 @@ import pytest
 from spring_bench import judged, spring
 
 from tissuejax.diagnosis.judgement.effort import Effort
+from tissuejax.diagnosis.judgement.judge import judge
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.diagnosis.specimens import Specimens, brief
 from tissuejax.diagnosis.stiffness_map import StiffnessMap
@@ -68,6 +69,19 @@ def test_sentences_say_how_sure_and_against_what(relaxing):
     found = re.search(r"misfit over the stated noise: ([\d.]+) .*with .* alone, ([\d.]+) .*with relax", lines)
     assert float(found[1]) > 1.5 > 1.1 > float(found[2]) > 0.9
     assert "second specimen" in sentences.next_steps(relaxing)[0]
+
+
+def test_a_page_says_where_the_answer_hangs_on_how_rare_faults_are(relaxing):
+    """Two names of the same evidence, one a fault: 0.91 for the tissue's, and even where both are as likely."""
+    answered = relaxing.answered
+    none, of = (next(s for s in answered.evidence.sets if s.names == n) for n in ((), ("relax",)))
+    sets = (none, of, replace(of, names=("lag",), keys=("lag",)))
+    evidence = replace(answered.evidence, sets=sets, forms={"relax": 1, "lag": 1}, faults=("lag",))
+    rare, hint = judge(evidence), "Were it as likely, the answer would be ambiguous"
+    assert rare.names == ("relax",)
+    shown = replace(relaxing, answered=replace(answered, evidence=evidence, judgement=rare))
+    assert any(hint in line and "10 times" in line for line in judged_sentences.sure(shown))
+    assert not any("Were it as likely" in line for line in judged_sentences.sure(relaxing))
 
 
 def test_a_page_says_how_often_evidence_of_simulations_says_nothing(relaxing):

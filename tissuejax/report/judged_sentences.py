@@ -1,8 +1,9 @@
 """A judged diagnosis in sentences: the verdict and what it rests on, in words that a physician can use."""
 
 import math
+from dataclasses import replace
 
-from tissuejax.diagnosis.judgement.judge import Kind
+from tissuejax.diagnosis.judgement.judge import Kind, judge
 from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.result import USED, Diagnosis
 from tissuejax.report.track_record import sentence
@@ -110,6 +111,21 @@ def lead(d: Diagnosis) -> str:
     )
 
 
+def _were_faults_common(d: Diagnosis) -> list[str]:
+    """What would be said if a fault of the machine were as likely beforehand as what tissue does, where it is else."""
+    criteria, j = d.answered.exploration.criteria, d.answered.judgement
+    if criteria.fault >= 1 or not d.answered.evidence.faults:
+        return []
+    other = judge(d.answered.evidence, replace(criteria, fault=1.0))
+    if other.kind is j.kind and set(other.names) == set(j.names):
+        return []
+    named = f": {joined(list(other.names))}" if other.names else ""
+    return [
+        f"Beforehand a fault of the test machine was held for {1 / criteria.fault:.0f} times less likely than what a "
+        f"tissue does. Were it as likely, the answer would be {other.kind.value}{named} ({chance(other.confidence)})."
+    ]
+
+
 def sure(d: Diagnosis) -> list[str]:
     """How sure, in numbers."""
     a, j, out = d.answered, d.answered.judgement, []
@@ -128,6 +144,7 @@ def sure(d: Diagnosis) -> list[str]:
     names = [(joined(list(s.names)) or "nothing at all", p) for s, p in j.alternatives if p > 1e-6][:1]
     if names and j.kind in (Kind.FOUND, Kind.IN_PART):
         out.append(f"Exactly these and no other: {chance(j.exact)}; the next best account is {names[0][0]}.")
+    out += _were_faults_common(d)
     told = [f"{_over_noise(a.empty, bool(a.bench.held_out))} with {d.energy} alone"]
     if a.chosen.keys:
         named = joined(list(dict.fromkeys(a.bench.candidates[k].name for k in a.chosen.keys)))
