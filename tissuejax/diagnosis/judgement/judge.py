@@ -117,7 +117,8 @@ class Beforehand:
     def _share(self, names: Collection[str], size: int) -> float:
         """Probability that so many act, and these among them."""
         others = self._products(n for n in self.odds if n not in names)[size - len(names)]
-        return self.sizes[size] * math.prod(self.odds[n] for n in names) * others / self._products(self.odds)[size]
+        odds = math.prod(self.odds[n] for n in names)
+        return self.sizes[size] * odds * float(others / self._products(self.odds)[size])
 
     def _products(self, names: Iterable[str]) -> Float[np.ndarray, " m"]:
         """Sums of the products of the odds of all sets of 0, 1, 2, ... of these effects."""
