@@ -79,6 +79,20 @@ def write_text(path: str | os.PathLike, content: str) -> Path:
     return write_bytes(path, content.encode("utf-8"))
 
 
+def write_between(path: str | os.PathLike, begin: str, end: str, content: str) -> Path:
+    """Replace what stands between two marks of a text, each on a line of its own, atomically; returns the path.
+
+    Raises:
+        InputError: a mark that is not there once, or the end before the beginning.
+    """
+    text = Path(path).read_text(encoding="utf-8")
+    before, _, rest = text.partition(begin)
+    _, _, after = rest.partition(end)
+    if text.count(begin) != 1 or text.count(end) != 1 or end not in rest:
+        raise InputError(f"{path}: nothing to fill in; it needs the lines {begin} and {end}, once and in this order")
+    return write_text(path, f"{before}{begin}\n{content.strip()}\n{end}{after}")
+
+
 def write_json(path: str | os.PathLike, content: object) -> Path:
     """Write `content` as indented JSON atomically; arrays become lists, NaN and infinities become null."""
     return write_text(path, json.dumps(plain(content), indent=2, allow_nan=False, ensure_ascii=False) + "\n")

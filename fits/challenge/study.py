@@ -13,7 +13,7 @@ from statistics import median
 
 from tissuejax.challenge.calibration import calibration
 from tissuejax.challenge.rates import rate
-from tissuejax.storage import write_json, write_text
+from tissuejax.storage import write_between, write_json
 
 VISIBLE = 3.0
 BEGIN, END = "<!-- pooled: written by the study -->", "<!-- end of pooled -->"
@@ -174,11 +174,7 @@ def main(folder: Path) -> str:
         *rows,
     ]
     write_json(folder / "pooled.json", found)
-    readme = folder / "README.md"
-    text = readme.read_text()
-    head, _, rest = text.partition(BEGIN)
-    _, _, tail = rest.partition(END)
-    write_text(readme, f"{head}{BEGIN}" + "\n".join(lines) + f"\n{END}{tail}")
+    write_between(folder / "README.md", BEGIN, END, "\n".join(lines))
     return "; ".join(
         f"{k}: singles {share(f['all']['visible singles: right and no other'])}"
         for k, f in found.items()

@@ -19,7 +19,7 @@ from tissuejax.challenge.panel import answered, read_causes, summary  # noqa: E4
 from tissuejax.diagnosis.judgement.evidence import read_evidence  # noqa: E402
 from tissuejax.diagnosis.judgement.judge import judge  # noqa: E402
 from tissuejax.diagnosis.judgement.rejudge import verdict_of  # noqa: E402
-from tissuejax.storage import write_json, write_text  # noqa: E402
+from tissuejax.storage import write_between, write_json  # noqa: E402
 
 BEGIN, END = "<!-- ablation: written by ablation.py -->", "<!-- end of ablation -->"
 COLUMNS = ("cause named and no wrong name", "cause named, whatever else", "nulls: a wrong physical name")
@@ -46,11 +46,8 @@ def main(folder: Path) -> None:
         found[label] = {"rates": dict(zip(COLUMNS, rates, strict=True)), "calibration_error": error}
         rows.append(f"| {label} | " + " | ".join(f"{r['share']:.0%}" for r in rates) + f" | {error:.2f} |")
     write_json(HERE / "ablation.json", {"samples": len(stored), "settings": found})
-    head = ["", f"| criteria ({len(stored)} samples) | {' | '.join(COLUMNS)} | calibration error |", "|---" * 5 + "|"]
-    readme = HERE / "README.md"
-    before, _, rest = readme.read_text().partition(BEGIN)
-    _, _, after = rest.partition(END)
-    write_text(readme, f"{before}{BEGIN}" + "\n".join([*head, *rows]) + f"\n{END}{after}")
+    head = [f"| criteria ({len(stored)} samples) | {' | '.join(COLUMNS)} | calibration error |", "|---" * 5 + "|"]
+    write_between(HERE / "README.md", BEGIN, END, "\n".join([*head, *rows]))
     print("\n".join(rows))
 
 

@@ -43,7 +43,7 @@ from tissuejax.diagnosis.judgement.reweigh import Found, reweighed  # noqa: E402
 from tissuejax.errors import InputError  # noqa: E402
 from tissuejax.progress import for_terminal  # noqa: E402
 from tissuejax.report.matters import matters_figure  # noqa: E402
-from tissuejax.storage import write_figure, write_json, write_text  # noqa: E402
+from tissuejax.storage import write_between, write_figure, write_json, write_text  # noqa: E402
 
 BEGIN, END = "<!-- matters: written by matters.py -->", "<!-- end of matters -->"
 RUNS = HERE / "runs" / "matters"
@@ -198,11 +198,8 @@ def table() -> str:
     still = [r["number"] for r in rows[2:] if not r[COLUMNS[0]]]
     quiet = sorted(p for p in set(still) if still.count(p) == len(FACTORS))
     said = f"Of {len(rows[2:])} changes {len(still)} change no answer. Neither does of: {', '.join(quiet)}."
-    readme = HERE / "README.md"
-    before, _, rest = readme.read_text().partition(BEGIN)
-    _, _, after = rest.partition(END)
-    body = "\n".join(["", f"Counts {of}.", "", head, "|---" * 7 + "|", *shown, "", said, ""])
-    write_text(readme, f"{before}{BEGIN}{body}{END}{after}")
+    body = "\n".join([f"Counts {of}.", "", head, "|---" * 7 + "|", *shown, "", said])
+    write_between(HERE / "README.md", BEGIN, END, body)
     return said
 
 

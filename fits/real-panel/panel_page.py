@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tissuejax.challenge.panel import Answer
 from tissuejax.report.challenge_table import confusion_figure
-from tissuejax.storage import write_figure, write_text
+from tissuejax.storage import write_between, write_figure, write_text
 
 BEGIN, END = "<!-- tables: written by the study -->", "<!-- end of tables -->"
 
@@ -36,11 +36,7 @@ def write(folder: Path, answers: list[Answer], found: dict) -> None:
         out.writerow([a.cause.id, a.cause.key, a.cause.null, a.truth, *said, f"{a.seconds:.0f}"])
     write_text(folder / "answers.csv", rows.getvalue())
     write_figure(folder / "confusion.png", confusion_figure(found["confusion"]), dpi=100)
-    readme = folder / "README.md"
-    text = readme.read_text()
-    head, _, rest = text.partition(BEGIN)
-    _, _, tail = rest.partition(END)
-    write_text(readme, f"{head}{BEGIN}\n{tables(answers, found)}\n{END}{tail}")
+    write_between(folder / "README.md", BEGIN, END, tables(answers, found))
 
 
 def tables(answers: list[Answer], found: dict) -> str:

@@ -7,7 +7,6 @@ The probability of all recordings together, as `judge` weighs sets, for odds of 
 rarity.json and the table between its marks in README.md.
 """
 
-import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -18,9 +17,9 @@ HERE = Path(__file__).resolve().parent
 
 from tissuejax.diagnosis.judgement.criteria import Criteria  # noqa: E402
 from tissuejax.diagnosis.judgement.evidence import Evidence, read_evidence  # noqa: E402
-from tissuejax.diagnosis.judgement.judge import Beforehand, left  # noqa: E402
-from tissuejax.effects.catalogue import effects  # noqa: E402
-from tissuejax.storage import write_json, write_text  # noqa: E402
+from tissuejax.diagnosis.judgement.judge import weighted  # noqa: E402
+from tissuejax.errors import InputError  # noqa: E402
+from tissuejax.storage import write_between, write_json  # noqa: E402
 
 ODDS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005)
 BEGIN, END = "<!-- rarity: written by rarity.py -->", "<!-- end of rarity -->"
@@ -28,17 +27,14 @@ BEGIN, END = "<!-- rarity: written by rarity.py -->", "<!-- end of rarity -->"
 
 def probability(e: Evidence, odds: float) -> float:
     """Log probability of a sample's recordings, all sets together, nats and a constant."""
-    criteria = replace(Criteria(), fault=odds)
-    faults = {name for name, kind in effects().items() if kind.order == 0}
-    usable = [s for s in e.sets if not s.void and math.isfinite(s.log_evidence)]
-    power = criteria.power(max(s.n for s in usable), left(max(usable, key=lambda s: s.log_evidence)))
-    before = Beforehand.of(e.forms, faults, criteria)
-    return float(logsumexp([power * s.log_evidence + before.log_prior(s) for s in usable]))
+    return float(logsumexp([weight for weight, _ in weighted(e, replace(Criteria(), fault=odds))]))
 
 
 def main(folder: Path) -> None:
     """Sum over all samples, and over those of each kind of tissue."""
     found = {f.stem: read_evidence(f) for f in sorted((folder / "runs").glob("*.json"))}
+    if old := [name for name, e in found.items() if not e.faults]:
+        raise InputError(f"{', '.join(old)}: the evidence does not say which effects are faults; diagnose again")
     kinds = sorted({name.split("-")[0] for name in found})
     rows, table = [], {}
     for odds in ODDS:
@@ -49,11 +45,8 @@ def main(folder: Path) -> None:
             f"| {odds:g} | **{sum(gained.values()):.1f}** | " + " | ".join(f"{own[k]:.1f}" for k in kinds) + " |"
         )
     write_json(HERE / "rarity.json", {"samples": len(found), "gained": table})
-    head = ["", f"| odds ({len(found)} samples) | all | {' | '.join(kinds)} |", "|---" * (len(kinds) + 2) + "|"]
-    readme = HERE / "README.md"
-    before, _, rest = readme.read_text().partition(BEGIN)
-    _, _, after = rest.partition(END)
-    write_text(readme, f"{before}{BEGIN}" + "\n".join([*head, *rows]) + f"\n{END}{after}")
+    head = [f"| odds ({len(found)} samples) | all | {' | '.join(kinds)} |", "|---" * (len(kinds) + 2) + "|"]
+    write_between(HERE / "README.md", BEGIN, END, "\n".join([*head, *rows]))
     print("\n".join(rows))
 
 

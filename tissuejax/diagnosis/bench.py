@@ -154,9 +154,7 @@ class Bench(abc.ABC):
         rig = (c.name for c in self.candidates.values() if c.rig and self.machine)
         return tuple(dict.fromkeys(rig))
 
-    machine: ClassVar[bool] = (
-        False  # whether a test machine made the recordings: its faults are rare (`Criteria.fault`)
-    )
+    machine: ClassVar[bool] = False  # whether a test machine made the recordings, whose faults are rare
     costly: ClassVar[bool] = False  # whether a prediction costs so much that one is saved where nothing hangs on it
 
     def ahead(self) -> AbstractContextManager[None]:

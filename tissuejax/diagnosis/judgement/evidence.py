@@ -99,7 +99,7 @@ def read_evidence(path: Path) -> Evidence:
             tuple(given["held_out"]),
             given["exhausted"],
             given.get("simulated", False),  # unknown to files of before it was asked
-            tuple(given.get("faults", ())),
+            tuple(given.get("faults", ())),  # the same: there faults are as likely as all else
         )
     except (OSError, KeyError, TypeError, json.JSONDecodeError) as error:
         raise InputError(

@@ -137,15 +137,20 @@ def left(s: SetEvidence) -> float:
     return max(1.0 - s.n / max(s.chi2, 1e-300), 0.0)
 
 
+def weighted(evidence: Evidence, criteria: Criteria) -> list[tuple[float, SetEvidence]]:
+    """Of every set that may be true the log of its prior times its evidence, to the power that all are compared by."""
+    before = Beforehand.of(evidence.forms, evidence.faults, criteria)
+    usable = [s for s in evidence.sets if not s.void and math.isfinite(s.log_evidence)]
+    power = criteria.power(max(s.n for s in usable), left(max(usable, key=lambda s: s.log_evidence)))
+    return [(power * s.log_evidence + before.log_prior(s), s) for s in usable]
+
+
 def judge(evidence: Evidence, criteria: Criteria | None = None) -> Judgement:
     """The verdict that the evidence asks for; see the module's text."""
     criteria = criteria or Criteria()
-    usable = [s for s in evidence.sets if not s.void and math.isfinite(s.log_evidence)]
-    groups: dict[frozenset, list[tuple[float, SetEvidence]]] = {}
     before = Beforehand.of(evidence.forms, evidence.faults, criteria)
-    power = criteria.power(max(s.n for s in usable), left(max(usable, key=lambda s: s.log_evidence)))
-    for s in usable:
-        weight = power * s.log_evidence + before.log_prior(s)
+    groups: dict[frozenset, list[tuple[float, SetEvidence]]] = {}
+    for weight, s in weighted(evidence, criteria):
         groups.setdefault(frozenset(s.names), []).append((weight, s))
     weights = {k: float(logsumexp([w for w, _ in rows])) for k, rows in groups.items()}
     whole = float(logsumexp(list(weights.values())))
