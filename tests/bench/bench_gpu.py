@@ -5,8 +5,8 @@
 Writes `results/gpu.json` with the card's name: wall nanoseconds an element and step of 88,000 and of 1,000,000 hexes,
 and the simulations that 256 diagnoses of one probing would ask for at once: 256 runs with constants of their own, and
 256 Jacobians to five constants, over one of each. A diagnosis itself is a search that the host drives, one question
-after the other: it has no form as one batch. The processor's figures come from processes of their own, by XLA on all
-cores and, where a compiler is, by the compiled loop on one. Nothing in the project depends on a card.
+after the other: it has no form as one batch. The processor's figures come from the same run, by a process of its own:
+where a compiler is, the compiled loop on one core. Nothing in the project depends on a card.
 """
 
 import json
@@ -28,6 +28,7 @@ from bench_step import VALUES, machine
 from tissuejax.energies.reduced_polynomial import ReducedPolynomial
 from tissuejax.energies.volumetric import Quadratic
 from tissuejax.mesh.columns import box
+from tissuejax.storage import write_json
 from tissuejax.tled import build
 from tissuejax.tled.simulate import COMPILER_OPTIONS, compiled
 
@@ -36,10 +37,6 @@ STEPS = {"88,000 hexes": 50, "1,000,000 hexes": 10}  # a frame, of 20 frames; a 
 BATCH = 256
 SMALL, SMALL_STEPS = (10, 10, 10), 25
 ROUNDS = 3
-HOSTS = {
-    "processor, XLA, all cores": {"TISSUEJAX_NATIVE": "off"},
-    "processor, compiled loop": {},
-}
 
 
 def body(counts, steps: int, dtype):
@@ -112,22 +109,21 @@ def figures() -> dict:
     return found
 
 
-def hosts() -> dict:
-    """The processor's figures, each in a process of its own."""
-    found = {}
-    for name, extra in HOSTS.items():
-        environment = os.environ | {"JAX_PLATFORMS": "cpu"} | extra
-        done = subprocess.run([sys.executable, __file__, "here"], env=environment, stdout=subprocess.PIPE, check=True)
-        found[name] = json.loads(done.stdout.splitlines()[-1])
-    return found
+def host() -> dict:
+    """The processor's figures, from a process of its own."""
+    environment = os.environ | {"JAX_PLATFORMS": "cpu"}
+    done = subprocess.run([sys.executable, __file__, "here"], env=environment, stdout=subprocess.PIPE, check=True)
+    return json.loads(done.stdout.splitlines()[-1])
 
 
 def main() -> None:
     if jax.default_backend() == "cpu":
         raise SystemExit("no graphics card that JAX can compute on is here: bench_step.py measures the processor")
-    told = {"card": figures()} | hosts() | {"machine": machine() | {"cores": os.cpu_count()}}
     target = Path(__file__).parent / "results" / "gpu.json"
-    target.write_text(json.dumps(told, indent=1) + "\n")
+    told: dict = {"machine": machine() | {"cores": os.cpu_count()}}
+    for name, job in (("card", figures), ("processor", host)):
+        told[name] = job()
+        write_json(target, told)  # what was measured stays, should a later part be stopped
     print(target.read_text())
 
 
