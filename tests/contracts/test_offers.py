@@ -1,4 +1,4 @@
-"""What every effect says of itself to a diagnosis, for both kinds of recordings: forms, shapes, ranges."""
+"""What every effect says of itself to a diagnosis, for every kind of recordings: forms, shapes, ranges."""
 
 import numpy as np
 import pytest
@@ -15,9 +15,12 @@ from tissuejax.model import Model
 
 SIZES = Sizes(energy=120.0, strain=0.3, force=0.8, session=600.0, recording=40.0, step=0.05)
 PROBED = Probed(modulus=900.0, height=0.02, session=400.0)
-OFFERS = {
-    ("homogeneous", n): kind.in_material_tests(SIZES) for n, kind in effects("homogeneous").items()
-} | {("probing", n): kind.in_probings(PROBED) for n, kind in effects("probing").items()}  # fmt: skip
+ASKED = {
+    "homogeneous": lambda kind: kind.in_material_tests(SIZES),
+    "probing": lambda kind: kind.in_probings(PROBED),
+    "cutting": lambda kind: kind.in_cuts(),
+}
+OFFERS = {(kind, n): ask(effect) for kind, ask in ASKED.items() for n, effect in effects(kind).items()}
 
 
 def called(key: tuple[str, str]) -> list:

@@ -8,8 +8,8 @@ from scipy.interpolate import PchipInterpolator
 
 from tissuejax.diagnosis.bench import Candidate
 from tissuejax.diagnosis.catalogue import entries
-from tissuejax.diagnosis.offered import LACKING, Protocol, needs, offered, paced
-from tissuejax.effects.catalogue import effects
+from tissuejax.diagnosis.offered import LACKING, Protocol, offered, paced
+from tissuejax.effects.catalogue import effects, needs
 from tissuejax.effects.form import Sizes
 from tissuejax.energies.catalogue import energy
 from tissuejax.experiments.catalogue import experiment
@@ -91,7 +91,7 @@ def test_a_drift_along_a_ramp_is_a_strain_energy():
 
 def test_what_remembers_the_way_is_a_strain_energy_until_it_comes_back():
     """Set and softening against a law of strain alone: alike on a ramp at any rate, unlike on the way back."""
-    on = [e for e in effects("homogeneous").values() if e.needs == "reversed" and e().parameters]
+    on = [e for e in effects("homogeneous").values() if e.needs.get("homogeneous") == "reversed" and e().parameters]
     assert {e.name for e in on} >= {"permanent-set", "softening"}
     for kind in on:
         added = kind()
@@ -109,7 +109,7 @@ def test_what_remembers_the_way_is_a_strain_energy_until_it_comes_back():
 
 def test_every_need_is_a_property_of_a_protocol_and_has_words():
     protocol = Protocol.of(sample(RAMP))
-    for need in needs().values():
+    for need in needs("homogeneous").values():
         assert isinstance(getattr(protocol, need), bool)
         assert LACKING[need]
 

@@ -9,7 +9,8 @@ from tissuejax.diagnosis.kinds.probings import Probings
 from tissuejax.diagnosis.kinds.recorded import Question
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_catalogue import probing_entries
-from tissuejax.diagnosis.probing_offered import WITHOUT, Pressed, asked, pressed
+from tissuejax.diagnosis.probing_offered import WITHOUT, Pressed, pressed
+from tissuejax.effects.catalogue import needs
 from tissuejax.effects.form import Probed
 from tissuejax.energies.catalogue import energy
 from tissuejax.estimation.series import Segment
@@ -48,9 +49,9 @@ def candidates():
 )
 def test_what_the_protocol_does_not_show_is_not_offered(segments, seen):
     kept, said = pressed(segments, candidates())
-    assert {c.name for c in kept.values()} & set(asked()) == seen
-    for name in set(asked()) - seen:
-        assert any(name in s and WITHOUT[asked()[name]] in s for s in said)
+    assert {c.name for c in kept.values()} & set(needs("probing")) == seen
+    for name in set(needs("probing")) - seen:
+        assert any(name in s and WITHOUT[needs("probing")[name]] in s for s in said)
 
 
 def test_names_that_were_not_asked_for_are_not_offered():
@@ -60,8 +61,8 @@ def test_names_that_were_not_asked_for_are_not_offered():
 
 def test_every_need_is_a_property_of_probings_and_has_words():
     protocol = Pressed.of(forces(BACK))
-    assert set(asked()) == {"specimen-scatter", "hysteresis", "force-hum"}
-    for need in asked().values():
+    assert set(needs("probing")) == {"specimen-scatter", "hysteresis", "force-hum"}
+    for need in needs("probing").values():
         assert isinstance(getattr(protocol, need), bool)
         assert WITHOUT[need]
 

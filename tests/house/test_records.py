@@ -58,7 +58,6 @@ ROUNDING = {
     "diagnosis/starts.py": {
         "inside 30": "scales that a linear step may go", "inside 0.9": "of a step to a bound", "inside 0.1": "its rest",
     },
-    "diagnosis/cutting_discrepancy.py": {"MAP 0.15": "width of a name"},
 }  # fmt: skip
 
 

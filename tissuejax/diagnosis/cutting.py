@@ -20,9 +20,10 @@ from jaxtyping import Float
 
 from tissuejax.cohesion.catalogue import law
 from tissuejax.diagnosis.bench import Bench, Candidate, Free
-from tissuejax.diagnosis.cutting_discrepancy import MAP
+from tissuejax.diagnosis.catalogue import settings
 from tissuejax.diagnosis.next_cut import next_cut
 from tissuejax.effects.catalogue import effects, suited
+from tissuejax.effects.form import Offer
 from tissuejax.energies.energy import Energy
 from tissuejax.energies.volumetric import Quadratic
 from tissuejax.errors import unknown
@@ -37,7 +38,6 @@ from tissuejax.recordings.recording import Channel, Sample
 
 BASE = ("cohesion.energy", "effects.onset.longer", "volumetric.K")
 STIFF = 10.0  # bulk over shear modulus where the tissue is not known
-FORMS = {"viscoelasticity": {"terms": 1}, "toughness-map": {"knots": 12}, "cutting-drift": {"separate": True}}
 WEDGING = 0.05  # share of the force that the modulus gives to wedging at the start
 
 
@@ -64,8 +64,9 @@ class CuttingBench(Bench):
         for name in names or ():
             if name not in known:
                 raise unknown("effect of cutting", name, known)
-        tried = [suited(n, "cutting", **FORMS.get(n, {})) for n in known if not names or n in names]
-        model = Model(energy, Quadratic(), (suited("onset", "cutting"), *tried), cohesion=law("bilinear"))
+        tried = [effects("cutting")[n].in_cuts() for n in known if not names or n in names]
+        acting = (suited("onset", "cutting"), *(o.effect for o in tried))
+        model = Model(energy, Quadratic(), acting, cohesion=law("bilinear"))
         p = predictor(model, sample, (*fitted, *held_out)) if like is None else like._p
         paths, recordings = p.paths_of, p.sample.recordings
 
@@ -90,7 +91,7 @@ class CuttingBench(Bench):
         free["cohesion.energy"] = Free(1e-3 * top, 1e2 * top, 0.1, "J/m^2", log=True)
         K = start["volumetric.K"]
         free["volumetric.K"] = Free(1e-4 * K, 1e2 * K, 0.3, "Pa", log=True)
-        candidates = {c.key: c for e in tried for c in _forms(e, fitted)}
+        candidates = {c.key: c for offer in tried for c in _forms(offer, fitted)}
         for c in candidates.values():
             for q in c.amplitudes:
                 if q not in free:  # of each stroke's own
@@ -184,18 +185,18 @@ def strokes_to_settle(sample: Sample, bench: CuttingBench, verdict) -> list[str]
     ]
 
 
-def _forms(e, strokes: tuple[str, ...]) -> list[Candidate]:
-    """An effect as the bench tries it: alike in all strokes, and where a stroke may have its own, so too."""
-    paths = {a: f"effects.{e.name}.{a}" for a in (*e.amplitudes, *e.grid)}
-    grid = tuple({paths[k]: v for k, v in s.items()} for s in e.settings(1.0)) or ({},)
-    alike = Candidate(e.name, tuple(paths[a] for a in e.amplitudes), tuple(paths[k] for k in e.grid), grid)
-    other = []
-    if e.name == MAP.name:
-        other.append(MAP)
-    elif any(d.each for d in e.parameters) and len(strokes) > 1:
-        several = tuple(f"{paths[a]}.{r}" for r in strokes for a in e.amplitudes)
-        other.append(replace(alike, amplitudes=several, form=MAP.form))
-    return [replace(alike, beside=tuple(c.key for c in other)), *(replace(c, beside=(alike.key,)) for c in other)]
+def _forms(offer: Offer, strokes: tuple[str, ...]) -> list[Candidate]:
+    """An effect as the bench tries it, each form beside the others; of each stroke's own where there are several."""
+    e, forms = offer.effect, [f for f in offer.forms if not f.each or len(strokes) > 1]
+    found = []
+    for form in forms:
+        paths = {q: f"effects.{e.name}.{q}" for q in form.free}
+        own = tuple(f"{paths[q]}.{r}" for r in strokes for q in form.each)
+        common = tuple(paths[q] for q in form.free if q in e.amplitudes and q not in form.each)
+        shapes = tuple(paths[q] for q in form.free if q not in e.amplitudes)
+        grid = settings(form.grid, {q: [path] for q, path in paths.items()})
+        found.append(Candidate(e.name, (*common, *own), shapes, grid, form=form.name, widens=dict(form.widens)))
+    return [replace(c, beside=tuple(o.key for o in found if o is not c)) for c in found]
 
 
 def _free(declared) -> Free:

@@ -23,12 +23,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from tissuejax.diagnosis.bench import Bench, Candidate
+from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.estimation.discrepancy import Part, smooth_factor
-
-MAP = Candidate("toughness-map", (), form="of each stroke's own", widens={"law": 0.15})
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 from tissuejax.diagnosis.bench import Candidate
 from tissuejax.diagnosis.judgement.particular import SHOWN, Shown
 from tissuejax.diagnosis.untimed import without_clock, without_pace
-from tissuejax.effects.catalogue import effects
+from tissuejax.effects.catalogue import needs
 from tissuejax.recordings.recording import Recording, Sample
 
 
@@ -142,11 +142,6 @@ LACKING: Mapping[str, str] = {  # property of a protocol: what is said where it 
 }
 
 
-def needs() -> dict[str, str]:
-    """By name, the property of a protocol that an answer needs; what needs none is not in it."""
-    return {name: effect.needs for name, effect in effects("homogeneous").items() if effect.needs}
-
-
 def offered(
     sample: Sample,
     candidates: Mapping[str, Candidate],
@@ -166,7 +161,7 @@ def offered(
     protocol = Protocol.of(sample, shown)
     if not protocol.rates:
         kept = without_pace(kept)
-    kept, left_out = speaking(widened(kept, protocol, names), protocol, needs(), LACKING)
+    kept, left_out = speaking(widened(kept, protocol, names), protocol, needs("homogeneous"), LACKING)
     return kept, remarks + left_out
 
 
@@ -190,18 +185,18 @@ def widened(
 
 
 def speaking(
-    candidates: Mapping[str, Candidate], protocol: object, asked: Mapping[str, str], lacking: Mapping[str, str]
+    candidates: Mapping[str, Candidate], protocol: object, needed: Mapping[str, str], lacking: Mapping[str, str]
 ) -> tuple[dict[str, Candidate], list[str]]:
     """Candidates that a protocol can show, and remarks on the others.
 
     Args:
         protocol: of the recordings, whatever their kind.
-        asked: by name of an effect, the property that it needs.
+        needed: by name of an effect, the property that it needs (`effects.catalogue.needs`).
         lacking: by property, what is said where it is not there.
     """
     why: dict[str, list[str]] = {}
     kept = dict(candidates)
-    for name, need in sorted(asked.items()):
+    for name, need in sorted(needed.items()):
         if any(c.name == name for c in kept.values()) and not getattr(protocol, need):
             kept = {k: c for k, c in kept.items() if c.name != name}
             why.setdefault(lacking[need], []).append(name)

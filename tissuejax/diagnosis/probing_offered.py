@@ -1,4 +1,4 @@
-"""Which candidates these probings can speak of: none that asks for what was not done (`Effect.asks`)."""
+"""Which candidates these probings can speak of: none that needs what was not done (`Effect.needs`)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 from tissuejax.diagnosis.bench import Candidate
 from tissuejax.diagnosis.judgement.particular import SHOWN, Shown
 from tissuejax.diagnosis.offered import motion, speaking, widened
-from tissuejax.effects.catalogue import effects
+from tissuejax.effects.catalogue import needs
 from tissuejax.estimation.series import Segment
 
 
@@ -47,11 +47,6 @@ WITHOUT: Mapping[str, str] = {  # property of the probings: what is said where i
 }
 
 
-def asked() -> dict[str, str]:
-    """By name, the property that an answer asks for; what asks for none is not in it."""
-    return {name: effect.asks for name, effect in effects("probing").items() if effect.asks}
-
-
 def pressed(
     segments: Sequence[Segment],
     candidates: Mapping[str, Candidate],
@@ -65,4 +60,4 @@ def pressed(
         shown: from when on a protocol shows something.
     """
     protocol = Pressed.of(segments, shown)
-    return speaking(widened(candidates, protocol, names), protocol, asked(), WITHOUT)
+    return speaking(widened(candidates, protocol, names), protocol, needs("probing"), WITHOUT)

@@ -16,7 +16,7 @@ from tissuejax.effects.catalogue import effects
 def without_clock(candidates: Mapping[str, Candidate]) -> dict[str, Candidate]:
     """Candidates that mean something without a clock; of effects that partly do, what is left of them."""
     known = effects("homogeneous")
-    acting = {name for name, effect in known.items() if effect.needs in ("rates", "times")}
+    acting = {name for name, effect in known.items() if effect.needs.get("homogeneous") in ("rates", "times")}
     still = {k: c for k, c in candidates.items() if c.name not in acting}
     return without(still, {(name, p) for name, effect in known.items() for p in effect.timed})
 

@@ -36,7 +36,7 @@ class Aging(Effect):
     reveals: ClassVar[str] = "later recordings stiffer or softer than earlier ones"
     blind: ClassVar[str] = "a single short recording"
     words: ClassVar[tuple[str, ...]] = ("stiffness changes by {rate:%} a second",)
-    needs: ClassVar[str] = "times"
+    needs: ClassVar[Mapping[str, str]] = {"homogeneous": "times"}
     source: ClassVar[str] = "first-order drift of the modulus"
     amplitudes: ClassVar[tuple[str, ...]] = ("rate",)
 

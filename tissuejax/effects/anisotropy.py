@@ -34,7 +34,7 @@ class Anisotropy(Effect):
     reveals: ClassVar[str] = "stiffness that differs between directions"
     blind: ClassVar[str] = "uniaxial recordings in a single direction"
     words: ClassVar[tuple[str, ...]] = ("fibres of {k1} run at {angle} to x", "stiffening with k2 {k2}")
-    needs: ClassVar[str] = "directions"
+    needs: ClassVar[Mapping[str, str]] = {"homogeneous": "directions"}
     source: ClassVar[str] = "Holzapfel, Gasser and Ogden 2000, eq. 65"
     isotropic: ClassVar[bool] = False
     amplitudes: ClassVar[tuple[str, ...]] = ("k1",)

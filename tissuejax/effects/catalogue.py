@@ -31,6 +31,11 @@ def effect(name: str, **options) -> Effect:
     return lookup("effect", name, found)(**options)
 
 
+def needs(kind: str) -> dict[str, str]:
+    """By name of an effect, the property of a protocol of experiments of `kind` that an answer needs, if any."""
+    return {name: effect.needs[kind] for name, effect in effects(kind).items() if kind in effect.needs}
+
+
 def suited(name: str, kind: str, **options) -> Effect:
     """The effect called `name`, for experiments of `kind`.
 

@@ -34,7 +34,7 @@ class ClockLag(Effect):
         "ramps at one rate without holds; holds alone; probings without markers; the steady middle of a cut"
     )
     words: ClassVar[tuple[str, ...]] = ("the clocks are {lag} apart",)
-    needs: ClassVar[str] = "rates"
+    needs: ClassVar[Mapping[str, str]] = {"homogeneous": "rates"}
     misjudged: ClassVar[Mapping[str, float]] = {"lag": 0.05}  # of one controller: its filters, a few samples
     source: ClassVar[str] = "Lister 2012, 2.2.1 (force at 62.5 Hz and cameras at 15 Hz on separate clocks)"
     amplitudes: ClassVar[tuple[str, ...]] = ("lag",)

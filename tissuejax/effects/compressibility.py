@@ -40,7 +40,7 @@ class Compressibility(Effect):
         "volume is lost at once (1/K {immediate})",
         "volume is lost by draining (1/K {drained} in {time})",
     )
-    needs: ClassVar[str] = "constraints"
+    needs: ClassVar[Mapping[str, str]] = {"homogeneous": "constraints"}
     source: ClassVar[str] = "Mow et al. 1980; Holzapfel 2000, sec. 6.4"
     amplitudes: ClassVar[tuple[str, ...]] = ("immediate", "drained")
     timed: ClassVar[tuple[str, ...]] = ("drained", "time")

@@ -6,6 +6,7 @@ from typing import ClassVar
 from jaxtyping import Array
 
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import OWN, Form, Offer
 from tissuejax.effects.probing_test import ProbingTest
 from tissuejax.parameters import Parameter
 from tissuejax.recordings.recording import Channel
@@ -27,6 +28,12 @@ class CuttingDrift(Effect):
     order: ClassVar[int] = 0
     amplitudes: ClassVar[tuple[str, ...]] = ("offset", "rate")
     separate: bool = False
+
+    @classmethod
+    def in_cuts(cls) -> Offer:
+        """See `Effect.in_cuts`: one for all strokes, or each its own."""
+        both = cls.amplitudes
+        return Offer(cls(separate=True), (Form("", both), Form(OWN, both, each=both)))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

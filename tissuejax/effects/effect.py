@@ -36,9 +36,9 @@ class Effect(eqx.Module):
             percentage, `:exp` the exponential, else the number with its unit. A clause is said where all parameters in
             it were fitted and its first one, or another of that unit, isn't zero; one without parameters always.
         shares: of these, parts of one whole, which together stay below it.
-        needs: what a protocol of material tests must do to show it, a property of `diagnosis.offered.Protocol`; "" if
-            nothing in particular. Where it is lacking the effect is another strain energy by its deeds, or nothing.
-        asks: the same of probings, a property of `diagnosis.probing_offered.Pressed`.
+        needs: by kind of experiment, what a protocol must do to show it, a property of `diagnosis.offered.Protocol` or
+            `diagnosis.probing_offered.Pressed`. Where it is lacking the effect is another strain energy by its deeds,
+            or nothing.
         remedy: what to do where it is named and has no parameters to fit, one sentence.
         timed: parameters that act in time, so that they mean nothing where no times were recorded.
         slow: of these, the ones that are another strain energy by their deeds where all is loaded at one rate and never
@@ -80,8 +80,7 @@ class Effect(eqx.Module):
     source: ClassVar[str]
     amplitudes: ClassVar[tuple[str, ...]]
     shares: ClassVar[tuple[str, ...]] = ()
-    needs: ClassVar[str] = ""
-    asks: ClassVar[str] = ""
+    needs: ClassVar[Mapping[str, str]] = {}
     remedy: ClassVar[str] = ""
     timed: ClassVar[tuple[str, ...]] = ()
     slow: ClassVar[tuple[str, ...]] = ()
@@ -114,6 +113,11 @@ class Effect(eqx.Module):
     def in_probings(cls, sizes: Probed) -> Offer:
         """The same of probings."""
         return Offer.whole(cls())
+
+    @classmethod
+    def in_cuts(cls) -> Offer:
+        """The same of cuts: its amplitudes and the shapes of its grid by default, those too that a fit holds."""
+        return Offer.scanned(cls())
 
     @property
     def neutral(self) -> dict[str, float]:

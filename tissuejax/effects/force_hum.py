@@ -36,7 +36,7 @@ class ForceHum(Effect):
     reveals: ClassVar[str] = "a line in the periodogram of the force, also out of contact, that markers lack"
     blind: ClassVar[str] = "fewer than 2.5 periods in a recording, or fewer than 4 samples of the force in a period"
     words: ClassVar[tuple[str, ...]] = ("the force carries a hum with parts of {sin} and {cos} at {frequency}",)
-    asks: ClassVar[str] = "sampled"
+    needs: ClassVar[Mapping[str, str]] = {"probing": "sampled"}
     source: ClassVar[str] = "Lomb 1976"
     order: ClassVar[int] = 0
     amplitudes: ClassVar[tuple[str, ...]] = ("sin", "cos")

@@ -16,6 +16,7 @@ import numpy as np
 if TYPE_CHECKING:
     from tissuejax.effects.effect import Effect
 
+OWN = "of each stroke's own"  # form of a cut, beside that which is alike in all
 Placed = Callable[[Mapping[str, np.ndarray], Mapping[str, float]], Sequence[Mapping[str, float]]]
 
 
@@ -148,3 +149,8 @@ class Offer:
         free = tuple(p.name for p in effect.parameters if not p.frozen)
         each = tuple(p.name for p in effect.parameters if p.each)
         return cls(effect, (Form("", free, dict(effect.grid), each=each),))
+
+    @classmethod
+    def scanned(cls, effect: "Effect") -> "Offer":
+        """In one form: its amplitudes and the shapes of its grid, frozen in a fit or not."""
+        return cls(effect, (Form("", (*effect.amplitudes, *effect.grid), dict(effect.grid)),))

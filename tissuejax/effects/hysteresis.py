@@ -27,7 +27,6 @@ class Hysteresis(Widening):
         "Cycle a steel spring in the rig: if the loop is there too, it is the rig's; else fit loading alone, or repeat "
         "at rates a decade apart to tell it from relaxation"
     )
-    needs: ClassVar[str] = "reversed"
-    asks: ClassVar[str] = "reversed"
+    needs: ClassVar[Mapping[str, str]] = {"homogeneous": "reversed", "probing": "reversed"}
     source: ClassVar[str] = "Ishlinskii 1944; Fung 1993, sec. 7.6"
     widens: ClassVar[Mapping[str, float]] = {"hysteresis": 0.15}

@@ -29,7 +29,7 @@ class LoadCellBend(Effect):
     reveals: ClassVar[str] = "a gain that grows with the force itself, in every mode and at every rate"
     blind: ClassVar[str] = "one specimen in one mode; one depth"
     words: ClassVar[tuple[str, ...]] = ("the load cell reads {bend} more for every newton",)
-    needs: ClassVar[str] = "unlike"
+    needs: ClassVar[Mapping[str, str]] = {"homogeneous": "unlike"}
     source: ClassVar[str] = "ISO 376:2011, 8.4"
     order: ClassVar[int] = 0
     amplitudes: ClassVar[tuple[str, ...]] = ("bend",)

@@ -42,7 +42,7 @@ class MachineCompliance(Effect):
     )
     blind: ClassVar[str] = "one specimen in one mode; cuts of one depth"
     words: ClassVar[tuple[str, ...]] = ("the rig gives way by {compliance}",)
-    needs: ClassVar[str] = "unlike"
+    needs: ClassVar[Mapping[str, str]] = {"homogeneous": "unlike"}
     source: ClassVar[str] = "Kalidindi, Abusafieh and El-Danaf 1997"
     order: ClassVar[int] = 0
     amplitudes: ClassVar[tuple[str, ...]] = ("compliance",)

@@ -33,7 +33,7 @@ class NonlinearViscosity(Effect):
     words: ClassVar[tuple[str, ...]] = ("{g:%} of the stress flows, with {tau} at small load and faster from {stress}",)
     source: ClassVar[str] = "Bergstrom and Boyce 1998, eq. 22"
     order: ClassVar[int] = 2
-    needs: ClassVar[str] = "rates"
+    needs: ClassVar[Mapping[str, str]] = {"homogeneous": "rates"}
     amplitudes: ClassVar[tuple[str, ...]] = ("g",)
     times: ClassVar[tuple[str, ...]] = ("tau",)
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"tau": (1.0, 10.0), "stress": (0.2,), "exponent": (3.0,)}

@@ -31,7 +31,7 @@ class PermanentSet(Effect):
     reveals: ClassVar[str] = "stress of the opposite sign at the first length, shifted origin in later cycles"
     blind: ClassVar[str] = "monotonic loading"
     words: ClassVar[tuple[str, ...]] = ("{amount:%} of the largest strain stays",)
-    needs: ClassVar[str] = "reversed"
+    needs: ClassVar[Mapping[str, str]] = {"homogeneous": "reversed"}
     source: ClassVar[str] = "Mullins 1969; Diani, Fayolle and Gilormini 2009"
     amplitudes: ClassVar[tuple[str, ...]] = ("amount",)
 

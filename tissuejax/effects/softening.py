@@ -41,7 +41,7 @@ class Softening(Effect):
     reveals: ClassVar[str] = "unloading below loading at any rate, reloading along the unloading path"
     blind: ClassVar[str] = "monotonic loading"
     words: ClassVar[tuple[str, ...]] = ("{r:%} of the stiffness is lost below the largest past load",)
-    needs: ClassVar[str] = "reversed"
+    needs: ClassVar[Mapping[str, str]] = {"homogeneous": "reversed"}
     source: ClassVar[str] = "Ogden and Roxburgh 1999, eq. 5.1; Simo 1987"
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {"m": (0.005, 0.02, 0.08, 0.3)}
     loading: bool = False

@@ -26,7 +26,6 @@ class SpecimenScatter(Widening):
     remedy: ClassVar[str] = (
         "Fit each recording by itself, or all as a cohort, and check the gain of the load cell between them"
     )
-    needs: ClassVar[str] = "repeated"
-    asks: ClassVar[str] = "several"
+    needs: ClassVar[Mapping[str, str]] = {"homogeneous": "repeated", "probing": "several"}
     source: ClassVar[str] = "Rasmussen and Williams 2006, Gaussian Processes for Machine Learning, sec. 2.7"
     widens: ClassVar[Mapping[str, float]] = {"gain": 0.3}

@@ -8,6 +8,7 @@ from jaxtyping import Array
 
 from tissuejax.effects.cutting_test import Cut
 from tissuejax.effects.effect import Effect
+from tissuejax.effects.form import OWN, Form, Offer
 from tissuejax.parameters import Parameter
 
 
@@ -25,6 +26,12 @@ class ToughnessMap(Effect):
     words: ClassVar[tuple[str, ...]] = ("toughness changes along the path",)
     source: ClassVar[str] = "Lister 2012, 3.1.3 (strength and energy by segment)"
     knots: int = 6
+
+    @classmethod
+    def in_cuts(cls) -> Offer:
+        """See `Effect.in_cuts`: one map for all strokes, or each its own, which is what any law leaves, far larger."""
+        alike = cls(knots=12)
+        return Offer(alike, (Form("", alike.amplitudes), Form(OWN, (), widens={"law": 0.15})))
 
     @property
     def amplitudes(self) -> tuple[str, ...]:

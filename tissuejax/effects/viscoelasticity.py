@@ -52,7 +52,7 @@ class Viscoelasticity(Effect):
         "{g4:%} with {tau4}",
         "{g5:%} with {tau5}",
     )
-    needs: ClassVar[str] = "rates"
+    needs: ClassVar[Mapping[str, str]] = {"homogeneous": "rates"}
     source: ClassVar[str] = "Fung 1993, sec. 7.6; Simo and Hughes 1998, sec. 10.3"
     order: ClassVar[int] = 2
     terms: int = 1
@@ -90,6 +90,11 @@ class Viscoelasticity(Effect):
         return Offer(
             cls(terms=2), (one, Form("two times", ("g1", "g2", "tau1", "tau2"), {"tau1": (0.5,), "tau2": (6.0,)}))
         )
+
+    @classmethod
+    def in_cuts(cls) -> Offer:
+        """See `Effect.in_cuts`: one time; the blade passes a place once."""
+        return Offer.scanned(cls(terms=1))
 
     @property
     def amplitudes(self) -> tuple[str, ...]:
