@@ -33,7 +33,7 @@ SHAPED := tests/contracts/test_energies.py tests/contracts/test_energies_orders.
     tests/contracts/test_cohesion.py tests/analytic/test_tensors.py tests/estimation/test_level.py \
     tests/estimation/test_noise.py tests/estimation/test_series.py tests/estimation/test_descent.py \
     tests/contracts/test_recordings_ground.py tests/contracts/test_recordings_hdf5.py \
-    tests/contracts/test_recordings_tables.py
+    tests/contracts/test_recordings_tables.py tests/contracts/test_effects.py tests/analytic/test_delayed.py
 # slipcover rewrites a line's counter away once it ran: 4 % more CPU, where coverage.py's tracer (before Python 3.12) took
 # 32 %. The longest files come first (tests/conftest.py).
 PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 XLA_FLAGS="$(QUICK)" $(BIN)/python -m slipcover --json
@@ -48,7 +48,7 @@ test: $(STAMP)
 
 shaped: $(STAMP)
 	mkdir -p out
-	TISSUEJAX_SHAPES=on $(PYTEST) --source tissuejax/energies,tissuejax/elements,tissuejax/cohesion,tissuejax/recordings,tissuejax/estimation \
+	TISSUEJAX_SHAPES=on $(PYTEST) --source tissuejax/energies,tissuejax/elements,tissuejax/cohesion,tissuejax/recordings,tissuejax/estimation,tissuejax/effects \
 	    --out out/shaped.coverage.json $(WORKERS) $(SHAPED)
 
 # What it said is kept in tests/slow.json, with date and commit.

@@ -17,7 +17,7 @@ from jaxtyping import install_import_hook
 # Shapes and types of the lower floors, checked while their own tests run (`make test`, or TISSUEJAX_SHAPES=on pytest);
 # the hook comes before anything of them is imported.
 CHECKED = ("tensors", "spectral", "parameters", "energies", "elements", "cohesion")
-CHECKED += ("recordings", "estimation")
+CHECKED += ("recordings", "estimation", "effects")
 if os.environ.get("TISSUEJAX_SHAPES") == "on":
     importlib.import_module("tests.shapes")
     install_import_hook([f"tissuejax.{room}" for room in CHECKED], "tests.shapes.checked")

@@ -28,7 +28,7 @@ CURRENT = {
 
 NEWEST = {
     "material tests": ("material-eleventh", "material-twelfth"),
-    "beside a rest": ("rest-sixth",),
+    "beside a rest": ("rest-seventh",),
     "probings": ("probing-fifth", "probing-sixth"),
 }  # of the judgement as it is
 

@@ -1,13 +1,18 @@
 """A clock that is late: exact where samples lie, smooth in the lag, at rest before and after."""
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from tissuejax.effects.history import delayed
+from tissuejax.effects import history
 
 TIME = 0.1 * np.arange(21)
 RAMP = np.interp(TIME, [0.5, 1.5], [0.0, 2.0])  # 2/s between two corners, both on a sample
+
+
+def delayed(time, x, lag):
+    return history.delayed(jnp.asarray(time), jnp.asarray(x), jnp.asarray(lag))
 
 
 def test_by_whole_samples_it_is_the_recording_itself_moved():
