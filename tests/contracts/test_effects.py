@@ -73,8 +73,8 @@ def test_neutral_hooks_change_no_bit_operation_by_operation(name):
         r = short[kind]
         test = jax.tree.map(jnp.asarray, experiment(r.experiment).test(r))
         with jax.disable_jit():
-            base = nominal_stress(BASE, local(BASE, VALUES, r.name), test)
-            off = nominal_stress(model, local(model, VALUES, r.name), test)
+            base = nominal_stress(BASE, jax.tree.map(jnp.asarray, local(BASE, VALUES, r.name)), test)
+            off = nominal_stress(model, jax.tree.map(jnp.asarray, local(model, VALUES, r.name)), test)
         np.testing.assert_array_equal(np.asarray(off), np.asarray(base))
 
 
