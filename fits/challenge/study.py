@@ -30,7 +30,7 @@ NEWEST = {
     "material tests": ("material-eleventh", "material-twelfth"),
     "beside a rest": ("rest-seventh",),
     "probings": ("probing-fifth", "probing-sixth"),
-}  # of the judgement as it is
+}  # the newest of each kind, of the judgements of their day
 
 
 def sets(folder: Path, kind: str) -> dict[str, list[dict]]:

@@ -10,7 +10,7 @@ MOST_TERMS = 5
 
 
 def effects(kind: str | None = None) -> dict[str, type[Effect]]:
-    """All effects by name, or those that act in experiments of `kind` ("homogeneous" or "probing")."""
+    """All effects by name, or those that act in experiments of `kind`, one of `Effect.kinds`."""
     return {name: cls for name, cls in members(package, Effect).items() if kind is None or kind in cls.kinds}
 
 

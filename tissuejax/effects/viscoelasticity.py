@@ -93,7 +93,7 @@ class Viscoelasticity(Effect):
 
     @classmethod
     def in_cuts(cls) -> Offer:
-        """See `Effect.in_cuts`: one time; the blade passes a place once."""
+        """See `Effect.in_cuts`: one time."""
         return Offer.scanned(cls(terms=1))
 
     @property
