@@ -25,7 +25,7 @@ def late(sample, lag):
     return replace(sample, recordings=recordings)
 
 
-@pytest.mark.parametrize("lag", [0.0, 0.05])
+@pytest.mark.parametrize("lag", [pytest.param(0.0, marks=pytest.mark.slow), 0.05])
 def test_a_late_clock_is_named_where_it_is(lag):
     found = tj.diagnose(late(tj.read(CUT), lag), "neo-hookean").as_dict()
     named = {e["name"]: e["parameters"] for e in found["effects"]}

@@ -100,6 +100,7 @@ def asked(disturbed):
     return diagnose(recorded(disturbed), "neo-hookean", effects=TRIED, effort=QUICK)
 
 
+@pytest.mark.slow
 def test_a_grip_that_slips_is_no_relaxation_and_the_page_says_when():
     answer = asked(slipping)
     assert answer.verdict.kind == "unexplained"
@@ -110,6 +111,7 @@ def test_a_grip_that_slips_is_no_relaxation_and_the_page_says_when():
     assert any("at once in slow" in sentence for sentence in sure(answer))
 
 
+@pytest.mark.slow
 def test_what_relaxes_is_not_taken_for_something_that_happened_at_once():
     answer = asked(relaxing)
     assert [e["name"] for e in answer.as_dict()["effects"]] == ["viscoelasticity"]

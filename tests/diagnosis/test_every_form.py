@@ -35,6 +35,7 @@ def diagnosed() -> tuple[list[str], dict]:
     return [e["name"] for e in effects], inner
 
 
+@pytest.mark.slow
 def test_damage_on_the_virgin_path_is_softening_and_no_relaxation():
     names, values = diagnosed()
     assert names == ["softening"]

@@ -1,6 +1,7 @@
 """Relaxation that is quicker the more it is loaded is tried, and has more evidence than any Prony series."""
 
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 
 import tissuejax as tj
@@ -25,6 +26,7 @@ def flowing(time: np.ndarray, stretch: np.ndarray) -> np.ndarray:
     return MU * (stretch - stretch**-2) - SHARE * z
 
 
+@pytest.mark.slow
 def test_relaxation_that_load_quickens_is_told_from_a_prony_series():
     rng, made = np.random.default_rng(4), {}
     for far in (1.02, 1.05, 1.1):

@@ -89,6 +89,7 @@ def relaxing(share: float, top: float, speed: float, rng) -> tuple[np.ndarray, n
     return time, stretch(time), weight @ steps + rng.normal(0, 3.0, len(time))
 
 
+@pytest.mark.slow
 def test_specimens_that_relax_by_shares_of_their_own_and_by_no_series_are_named_for_relaxation_alone():
     """Four specimens lose 70 to 90 % of what can relax, by a power law. Before this part came in, another law of the
     energy was named beside the relaxation, with 0.99, and the energy is exactly the base's."""

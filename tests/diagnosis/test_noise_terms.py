@@ -81,7 +81,7 @@ def test_nor_is_it_where_its_level_was_not_recorded():
     ("disturbed", "verdict", "level"),
     [
         (lambda rng, t, s: s + 1.8 * NOISE * rng.standard_normal(len(t)), "nothing-missing", 1.8),
-        (spiky, "unexplained", np.sqrt(1 + 0.06 * 40**2)),
+        pytest.param(spiky, "unexplained", np.sqrt(1 + 0.06 * 40**2), marks=pytest.mark.slow),
     ],
     ids=["stated too low", "spikes"],
 )

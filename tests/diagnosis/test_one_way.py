@@ -60,6 +60,7 @@ def test_no_strain_energy_and_nothing_unknown_widens_a_law_that_is_added():
     assert scales.priors(Criteria(), ("energy-form/smooth in stretch",)).width[0] > 0.1
 
 
+@pytest.mark.slow
 def test_a_foam_that_keeps_its_width_is_named_for_its_volume():
     """A plateau and what crowding adds, width L^-0.1: no law of the catalogue. As long as a law added to the base's
     stress could be large in a press without a way back, the volume had 0.78. A further name may come in by rounding, a

@@ -42,6 +42,18 @@ def stepping():
     return diagnosed(bench)
 
 
+def test_what_a_user_prints_are_plain_numbers(relaxing, stepping):
+    def leaves(told):
+        if isinstance(told, dict):
+            return [leaf for key, value in told.items() for leaf in (key, *leaves(value))]
+        return [leaf for value in told for leaf in leaves(value)] if isinstance(told, list | tuple) else [told]
+
+    for found in (relaxing, stepping):
+        kinds = {type(leaf) for leaf in leaves(found.as_dict())}
+        assert {float, int, str} <= kinds
+        assert all(k.__module__ == "builtins" for k in kinds), kinds
+
+
 def test_the_page_tells_the_story_in_its_order(relaxing, tmp_path):
     page = write_diagnosis(relaxing, tmp_path)["page"].read_text()
     assert not re.search(r'(src|href)="(?!data:)', page), "the page points outside itself"

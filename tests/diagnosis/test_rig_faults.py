@@ -65,7 +65,7 @@ def relaxed(time, path, g=0.3, tau=1.5):
         ),
         (loaded_before, "slack", "effects.slack.preload", 0.03),
         (lambda t, path: elastic(path(t)) + 60.0, "drift", "effects.drift.offset", 60.0),
-        (relaxed, "viscoelasticity", None, None),
+        pytest.param(relaxed, "viscoelasticity", None, None, marks=pytest.mark.slow),
         (  # stiffer by a fifth where it is pulled far, softer where it is pushed: no power, no exponential
             lambda t, path: elastic(path(t)) * (1 + 0.2 * np.tanh(9 * (path(t) - 1.08))),
             "energy-form",

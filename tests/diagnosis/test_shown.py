@@ -7,6 +7,7 @@ squares of the same law, written out here.
 import math
 
 import numpy as np
+import pytest
 from scipy.optimize import least_squares
 
 import tissuejax as tj
@@ -38,6 +39,7 @@ def recording(name: str, top: float, speed: float, power: float, start: float, r
     return Recording(name, "uniaxial", drives, {"nominal_stress": Channel(time, measured, "Pa", NOISE)})
 
 
+@pytest.mark.slow
 def test_what_is_shown_comes_as_near_as_a_plain_fit_of_the_same_law():
     """Under the whole discrepancy parameters settled where it took most of the stress: 65 % of the misfit was removed,
     and beside the same name 99 % can be."""

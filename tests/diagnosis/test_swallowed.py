@@ -8,6 +8,7 @@ import pytest
 import tissuejax as tj
 
 
+@pytest.mark.slow
 def test_the_stiffness_comes_back_once_relaxation_is_named():
     truth = json.loads(Path("data/demo/truth.json").read_text())["relaxing"]
     found = tj.diagnose("data/demo/relaxing.h5", energy="reduced-polynomial-2").as_dict()

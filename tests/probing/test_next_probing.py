@@ -55,6 +55,7 @@ def test_a_stiffness_scale_tells_nothing_apart_and_a_shape_does():
     assert told_apart([a, a], own, sigma, 0) == 0
 
 
+@pytest.mark.slow
 def test_a_stuck_and_a_slipping_base_are_told_apart_by_some_press():
     settings = {k: getattr(bench.QUICK, k) for k in ("mesh", "interval", "step", "stiffness_damping", "processes")}
     s = bench.sample(bench.recording("r1"), bench.recording("r2", place=(0.004, 0.0)))

@@ -84,8 +84,15 @@ def test_what_c_computes_is_what_xla_computes(set_up, derived):
 SIDES = Wedge(8e-3, 0.3, 2e-3, side=np.tile([1.0, 1.0, -1.0, -1.0], 4))  # of the facets on the tissue's either side
 
 
-@pytest.mark.parametrize("form", [Sphere(4e-3), Punch(3e-3, 1e-3), SIDES], ids=["ball", "flat punch", "blade"])
-@pytest.mark.parametrize("rough", [False, True], ids=["bare", "friction and adhesion"])
+FORMS = {"ball": Sphere(4e-3), "flat punch": Punch(3e-3, 1e-3), "blade": SIDES}
+PAIRS = [pytest.param(form, False, id=f"bare-{name}") for name, form in FORMS.items()]
+PAIRS += [  # half a minute each, most of it XLA's compiling
+    pytest.param(form, True, id=f"friction and adhesion-{name}", marks=[pytest.mark.slow] * (name != "ball"))
+    for name, form in FORMS.items()
+]
+
+
+@pytest.mark.parametrize(("form", "rough"), PAIRS)
 def test_contact_in_c_is_contact_by_xla(monkeypatch, form, rough):
     """Forces, torque, what rubbing lost and the memory after two places of the probe, their tangents and gradients."""
     made = cases.plain(box((0.02, 0.02, 0.01), (4, 4, 2)), np.arange(2.0), order=1)

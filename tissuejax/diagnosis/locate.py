@@ -125,7 +125,8 @@ def _phases(segments: list[Segment], z: np.ndarray) -> Iterable[Located]:
         return
     for i in np.argsort(-sums):
         if counts[i]:
-            share, ratio = sums[i] / sums.sum(), (sums[i] / sums.sum()) / (counts[i] / counts.sum())
+            share = float(sums[i] / sums.sum())
+            ratio = share / float(counts[i] / counts.sum())
             what = f"{PHASES[i]}: {ratio:.1f} times its share of the samples"
             yield Located(segments[0].channel, "all", what, share, "phase", {"phase": PHASES[i], "density": ratio})
 
