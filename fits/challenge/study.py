@@ -20,14 +20,14 @@ BEGIN, END = "<!-- pooled: written by the study -->", "<!-- end of pooled -->"
 CURRENT = {
     "material": ("material", "material-second", "material-third", "material-fourth", "material-fifth",
                  "material-sixth", "material-seventh", "material-eighth", "material-ninth",
-                 "material-tenth", "material-eleventh", "material-twelfth"),
+                 "material-tenth", "material-eleventh", "material-twelfth", "material-thirteenth"),
     "probing": ("probing", "probing-strong", "probing-strong-second", "probing-pairs", "probing-second",
                 "probing-strong-third", "probing-third", "probing-fourth", "probing-fifth", "probing-sixth"),
 }  # fmt: skip
 
 
 NEWEST = {
-    "material tests": ("material-eleventh", "material-twelfth"),
+    "material tests": ("material-thirteenth",),
     "beside a rest": ("rest-seventh",),
     "probings": ("probing-fifth", "probing-sixth"),
 }  # the newest of each kind, of the judgements of their day
