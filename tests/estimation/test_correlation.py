@@ -5,7 +5,7 @@ Noise is drawn here by filters and random walks of the test's own, at even, mixe
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter
 
 from tissuejax.estimation import correlation
 from tissuejax.estimation.correlation import Series, estimate
@@ -94,6 +94,48 @@ def test_recordings_of_two_sensors_get_a_noise_each(rng):
     assert not found.common
     assert found.noises[0].share < 0.05
     assert found.noises[1].tau == pytest.approx(0.5, rel=0.5)
+
+
+def filtered(rng, n, corner):
+    """Behind a digital Butterworth filter of second order, of unit variance, and its autocorrelation by lag."""
+    b, a = butter(2, corner)
+    answer = lfilter(b, a, np.eye(1, 1000)[0])
+    alike = np.correlate(answer, answer, "full")[999:] / (answer @ answer)
+    return lfilter(b, a, rng.normal(size=n + 1000))[1000:] / np.sqrt(answer @ answer), alike
+
+
+@pytest.mark.parametrize("corner", [0.06, 0.2])
+@pytest.mark.parametrize("size", [0.0, 1.5, 30.0])
+def test_a_filter_of_second_order_is_found_beside_a_mismatch(rng, corner, size):
+    """Its corner follows the rate of each recording's converter. What means of 16 samples scatter by is right or too
+    large by less than a half (a digital filter lets less through near half the rate than one in time: the time found
+    is too long); taken for white it would be 2 to 4 times too small."""
+    series, alike = [], np.ones(1)
+    for time in (FAST, SLOW, FAST):
+        noise, alike = filtered(rng, len(time), corner)
+        series.append(Series(time, (noise + size * mismatch(time))[:, None]))
+    found = estimate(series, orders=(1, 2))
+    assert [n.order for n in found.noises] == [2, 2, 2]
+    lag = np.abs(np.subtract.outer(np.arange(16), np.arange(16)))
+    for noise, step in zip(found.noises, (0.04, 1.0, 0.04), strict=True):
+        scatter = np.sqrt(np.mean(noise.covariance(np.arange(16) * step)) / np.mean(alike[lag]))
+        assert 0.85 < scatter < 1.5
+    # a series whose mismatch falls like its noise may count all of it as mismatch; the shape is the others'
+    assert max(found.levels) == pytest.approx(1.0, rel=0.15)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.9])
+def test_no_filter_of_second_order_is_found_where_there_is_none(rng, rho):
+    series = [Series(FAST, (autoregression(rng, 626, rho) + 5 * mismatch(FAST))[:, None]) for _ in range(3)]
+    found = estimate(series, orders=(1, 2)).noises[0]
+    assert found.order == 1
+    assert float(found.correlation(0.04)) == pytest.approx(rho, abs=0.09)
+
+
+def test_what_is_smooth_and_far_below_the_recorded_level_is_no_noise_of_that_level(rng):
+    """Noise stated twenty times too large beside a mismatch: its shape is not that of the noise."""
+    left = [Series(FAST, (0.05 * rng.normal(size=626) + 0.3 * mismatch(FAST))[:, None]) for _ in range(3)]
+    assert estimate(left, orders=(1, 2)).noises[0].share < 0.05
 
 
 @pytest.mark.parametrize("level", [0.5, 2.0])

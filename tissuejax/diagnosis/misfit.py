@@ -75,7 +75,7 @@ def estimated(bench: Bench, prediction: Float[np.ndarray, " N"]) -> Misfit:
             Series(own[0].time, np.stack([(bench.y - prediction)[s.rows] / bench.sigma[s.rows] for s in own], axis=1))
             for own in alike
         ]
-        found = estimate(series)
+        found = estimate(series, orders=(1, 2))
         noises |= {(name, channel): noise for name, noise in zip(blocks, found.noises, strict=True)}
         if blocks:
             longest = max(blocks, key=lambda name: len(blocks[name][0].time))

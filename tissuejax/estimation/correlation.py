@@ -11,6 +11,10 @@ whose likelihood is exact at any sampling: a Kalman filter with four numbers' wo
 walk (spectrum exactly f^-4; its posterior mean is a cubic smoothing spline) is the nuisance, one a recording, with a
 level and a slope that nothing is known of.
 
+Behind a filter of second order noise falls as f^-4 too, above its corner; below it such noise is flat and has the
+recorded variance, and a walk grows without end. Where the recorded white noise is not to be seen, that is asked. A
+filter has a time in seconds, or follows the rate of its converter: then it is one in samples.
+
 The shape (share, tau) is common to the recordings unless their likelihoods say otherwise. The level is the recorded
 one, unless they say that it is wrong: then it is each recording's own.
 
@@ -31,11 +35,13 @@ from tissuejax.cache.programs import Kept
 from tissuejax.estimation.noise import Noise
 
 LEAST = 64  # samples of a series from which its correlation can be told from a mismatch
+MISSTATED = 2.0  # factor by which a recorded level may be wrong: levels that are read off a rest seldom are worse
 GAIN = 8.0  # twice the log-likelihood by which correlated noise must beat white: 2 Akaike units a parameter beyond cost
 SHARES, TAUS, WALKS = 6, 7, 9  # tried at once of the share, the time, the intensity of the walk: one program
 ROUNDS = 3  # of trials, each in a narrower range
 DIFFUSE = 1e4  # prior variance of the mismatch's level over that of the residual
-NEVER_WHITE = 1e-3  # least share of white noise that is tried
+NEVER_WHITE = {1: 1e-3, 2: 1e-6}  # least share of white noise that is tried, by order: a filter leaves next to none
+UNLIKE = 1.1  # ratio of sampling steps from which a filter in seconds and one in samples are two things
 
 
 @dataclass(frozen=True)
@@ -93,12 +99,18 @@ def estimate(
     common = 2 * shared.apart < 0.5 * price  # on a coarse grid; the rest is seen where it may matter
     alone = [_best([s], orders) for s in surfaces] if not common else [shared] * len(surfaces)
     common = common or 2 * (sum(a.likelihood for a in alone) - shared.likelihood) <= price
-    noises = [Noise.shaped(shared.share, shared.tau, order=shared.order)] * len(series)
-    for i, own, level in zip(long, alone, shared.levels):
+    noises = [shared.noise(_step(np.asarray(s.time, float))) for s in series]
+    for i, own, surface, level in zip(long, alone, surfaces, shared.levels):
         levels[i] = level if common else own.levels[0]
         if not common:
-            noises[i] = Noise.shaped(own.share, own.tau, order=own.order)
+            noises[i] = own.noise(surface.step)
     return Estimate(tuple(noises), tuple(levels), common)
+
+
+def _step(time: Float[np.ndarray, " n"]) -> float:
+    """Typical time between samples, s; two samples may share a time, and one has none to another."""
+    steps = np.diff(time)
+    return float(np.median(steps[steps > 0])) if np.any(steps > 0) else 1.0
 
 
 class _Surface:
@@ -109,7 +121,7 @@ class _Surface:
         time = np.asarray(series.time, float) - series.time[0]
         self.n, self.columns = len(time), series.values.reshape(len(time), -1).T
         steps = np.diff(time)
-        self.span, self.step = time[-1], float(np.median(steps[steps > 0]))  # two samples may share a time
+        self.span, self.step = time[-1], _step(time)
         line = np.stack([np.ones(self.n), time / self.span - 0.5], 1)
         self.columns = self.columns - (line @ np.linalg.lstsq(line, self.columns.T, rcond=None)[0]).T
         size = float(np.mean(self.columns**2)) or 1.0
@@ -160,7 +172,11 @@ class _Surface:
 
 @dataclass(frozen=True)
 class _Found:
-    """A shape; `apart` is by how much the log-likelihood may grow if every series has a shape of its own."""
+    """A shape; `apart` is by how much the log-likelihood may grow if every series has a shape of its own.
+
+    Attributes:
+        tau: s, or in samples of each series where `sampled`.
+    """
 
     share: float
     tau: float
@@ -168,38 +184,67 @@ class _Found:
     levels: list[float]
     apart: float = 0.0
     order: int = 1
+    sampled: bool = False
+
+    def noise(self, step: float) -> Noise:
+        """Of unit variance, of a series with `step` s between samples."""
+        return Noise.shaped(self.share, self.tau * (step if self.sampled else 1.0), order=self.order)
+
+    @property
+    def seen(self) -> bool:
+        """Whether any series shows noise of the level that was recorded."""
+        return max(self.levels) * MISSTATED >= 1
 
 
 def _best(surfaces: Sequence[_Surface], orders: tuple[int, ...] = (1,)) -> _Found:
     """White noise or, if that is clearly better, correlated; of the recorded level unless that is clearly wrong.
 
     Whether it is correlated is asked with the level free: a level that is a little off must not be read as a shape.
+    What is correlated at a small part of the recorded level everywhere is no noise of that level, and a rest. Where
+    white noise of the level is seen, no filter of second order was passed, and none is sought.
     """
     maps = [s(np.zeros(1), np.ones(1), s.walks(s.least, s.most, SHARES * TAUS), True) for s in surfaces]
     white = _Found(0.0, 1.0, sum(float(t[0][0, 0]) for t in maps), [math.sqrt(t[2][0, 0]) for t in maps])
     alone = [float(t[0][0, 0]) for t in maps]
-    found = max((_correlated(surfaces, alone, True, order=k) for k in orders), key=lambda f: f.likelihood)
-    if 2 * (found.likelihood - white.likelihood) <= GAIN:
+    capped = surfaces[0].capped
+    found = _correlated(surfaces, alone, True, min(orders))
+    if 2 in orders and (not capped or 2 * (found.likelihood - white.likelihood) > GAIN or not white.seen):
+        unlike = max(s.step for s in surfaces) > UNLIKE * min(s.step for s in surfaces)
+        clocks = (False, True) if unlike else (False,)
+        second = max((_correlated(surfaces, alone, True, 2, clock) for clock in clocks), key=lambda f: f.likelihood)
+        found = second if 2 * (second.likelihood - found.likelihood) > (GAIN if capped else 0) else found
+    if 2 * (found.likelihood - white.likelihood) <= GAIN or (capped and not found.seen):
         return replace(white, apart=found.apart)
-    if not surfaces[0].capped:
+    if not capped:
         return found
-    recorded = _correlated(surfaces, [-math.inf] * len(surfaces), False, near=found, order=found.order)
+    recorded = _correlated(surfaces, [-math.inf] * len(surfaces), False, near=found)
     if 2 * (found.likelihood - recorded.likelihood) > GAIN * len(surfaces):
         return found
     return replace(recorded, apart=found.apart)
 
 
 def _correlated(
-    surfaces: Sequence[_Surface], white: Sequence[float], free: bool, near: _Found | None = None, order: int = 1
+    surfaces: Sequence[_Surface],
+    white: Sequence[float],
+    free: bool,
+    order: int = 1,
+    sampled: bool = False,
+    near: _Found | None = None,
 ) -> _Found:
     """The share and the time of highest likelihood, on ever narrower grids.
 
     Args:
         white: likelihoods without a share.
-        near: where to begin, two rounds instead of three.
+        sampled: whether the time is one in samples of each series: a filter that follows the rate of a converter.
+        near: where to begin, two rounds instead of three; of its order, and in its unit of time.
     """
-    logits, taus = np.linspace(-4.5, 6.5, SHARES), np.array([s.step for s in surfaces])
-    logs = np.linspace(math.log(min(taus) / 3), math.log(max(s.span for s in surfaces) / 3), TAUS)
+    if near is not None:
+        order, sampled = near.order, near.sampled
+    never = NEVER_WHITE[order]
+    units = [s.step if sampled else 1.0 for s in surfaces]
+    logits = np.linspace(-4.5, math.log(1 / never - 1), SHARES)
+    least, most = (min(s.step / u for s, u in zip(surfaces, units)), max(s.span / u for s, u in zip(surfaces, units)))
+    logs = np.linspace(math.log(least / 3), math.log(most / 3), TAUS)
     if near is not None:
         at = math.log(near.share / (1 - near.share))
         logits = np.linspace(at - 2, at + 2, SHARES)
@@ -207,8 +252,8 @@ def _correlated(
     ranges = [(s.least, s.most) for s in surfaces]
     best, apart = _Found(0.0, 1.0, -math.inf, []), None
     for _ in range(ROUNDS if near is None else ROUNDS - 1):
-        shares = np.minimum(1 / (1 + np.exp(-logits)), 1 - NEVER_WHITE)
-        maps = [s(shares, np.exp(logs), s.walks(*r), free, order) for s, r in zip(surfaces, ranges)]
+        shares = np.minimum(1 / (1 + np.exp(-logits)), 1 - never)
+        maps = [s(shares, u * np.exp(logs), s.walks(*r), free, order) for s, u, r in zip(surfaces, units, ranges)]
         total = sum((t[0] for t in maps[1:]), maps[0][0])
         i, j = np.unravel_index(np.argmax(total), total.shape)
         if apart is None:
@@ -216,7 +261,8 @@ def _correlated(
             apart = own - max(float(total[i, j]), sum(white))
         if total[i, j] > best.likelihood:
             levels = [math.sqrt(t[2][i, j]) for t in maps]
-            best = _Found(float(shares[i]), float(math.exp(logs[j])), float(total[i, j]), levels, apart, order)
+            tau = float(math.exp(logs[j]))
+            best = _Found(float(shares[i]), tau, float(total[i, j]), levels, apart, order, sampled)
         ranges = [_narrowed(r, float(t[1][i, j])) for r, t in zip(ranges, maps)]
         logits = _around(logits, int(i))
         logs = _around(logs, int(j))

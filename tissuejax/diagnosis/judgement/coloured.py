@@ -41,20 +41,26 @@ def means_covariance(
 ) -> Float[np.ndarray, "M M"]:
     """Covariance of means over blocks of samples that begin at `starts`.
 
-    Between blocks the exponential falls apart into what a block has to its end, the time between, and what the other
-    has from its beginning; within a block all pairs are summed.
+    Between blocks the correlation falls apart into what a block has to its end, the time between, and what the other
+    has from its beginning: of first order exp(-d) is a product, of second order (1 + d) exp(-d) a sum of three.
+    Within a block all pairs are summed.
 
     Args:
-        noise: of unit variance, behind a low-pass of first order; sigma: its standard deviation at every sample.
+        noise: of unit variance; sigma: its standard deviation at every sample.
     """
     ends = np.append(starts[1:], len(time))
-    late, early = np.empty(len(starts)), np.empty(len(starts))
+    late, early = np.empty((2, len(starts))), np.empty((2, len(starts)))  # sums of exp(-d) and of d exp(-d)
     own = np.empty(len(starts))
     for k, (a, b) in enumerate(zip(starts, ends, strict=True)):
         t, w = time[a:b], sigma[a:b] / (b - a)
-        late[k] = np.sum(w * np.exp((t - t[-1]) / noise.tau))
-        early[k] = np.sum(w * np.exp((t[0] - t) / noise.tau))
+        for sums, d in ((late, (t[-1] - t) / noise.tau), (early, (t - t[0]) / noise.tau)):
+            faded = w * np.exp(-d)
+            sums[:, k] = np.sum(faded), np.sum(d * faded)
         own[k] = np.sum(w * noise.times(w, t))
     gap = time[starts][None, :] - time[ends - 1][:, None]  # from the end of one to the beginning of another
-    upper = np.triu(noise.share * late[:, None] * early[None, :] * np.exp(-np.maximum(gap, 0.0) / noise.tau), 1)
+    gap = np.maximum(gap, 0.0) / noise.tau
+    alike = np.outer(late[0], early[0])
+    if noise.order == 2:
+        alike = (1 + gap) * alike + np.outer(late[1], early[0]) + np.outer(late[0], early[1])
+    upper = np.triu(noise.share * np.exp(-gap) * alike, 1)
     return upper + upper.T + np.diag(own)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tissuejax.diagnosis.judgement.particular import MEANS, SHOWN, SIMULATED, STROKES, Means, Shown, Simulated, Strokes
+from tissuejax.estimation.correlation import MISSTATED
 from tissuejax.estimation.level import OF_NOTE
 from tissuejax.estimation.smoothness import USUAL, Smoothness
 
@@ -104,7 +105,7 @@ class Criteria:
     negligible: float = OF_NOTE
     unseen: float = 0.5
     alike: int = 10
-    misstated: float = 2.0
+    misstated: float = MISSTATED
     named: float = 0.5
     covered: float = 0.9
     strong: float = 20.0
