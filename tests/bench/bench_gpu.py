@@ -111,7 +111,7 @@ def figures() -> dict:
 
 def host() -> dict:
     """The processor's figures, from a process of its own."""
-    environment = os.environ | {"JAX_PLATFORMS": "cpu"}
+    environment = os.environ | {"JAX_PLATFORMS": "cpu", "OMP_NUM_THREADS": "1"}  # the loop would share two threads
     done = subprocess.run([sys.executable, __file__, "here"], env=environment, stdout=subprocess.PIPE, check=True)
     return json.loads(done.stdout.splitlines()[-1])
 
