@@ -1,13 +1,19 @@
 """A diagnosis of a material test that was stopped goes on: what was weighed is on disk, and the answer is the same."""
 
 import json
+import shutil
 from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from tests.diagnosis.test_budget import sample
+from tissuejax.cache import source
 from tissuejax.diagnosis.diagnose import diagnose
+from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.progress import Progress, Stage
+from tissuejax.recordings.recording import Sample
 
 
 class Notes(Progress, Stage):
@@ -26,9 +32,9 @@ class Notes(Progress, Stage):
             raise KeyboardInterrupt
 
 
-def asked(out, n=None, energy="neo-hookean"):
+def asked(out, n=None):
     notes = Notes(n)
-    return diagnose(sample(), energy, effects=("drift", "aging"), out=out, progress=notes), notes.said
+    return diagnose(sample(), "neo-hookean", effects=("drift", "aging"), out=out, progress=notes), notes.said
 
 
 def test_a_stopped_diagnosis_goes_on(tmp_path):
@@ -55,8 +61,37 @@ def test_a_stopped_diagnosis_goes_on(tmp_path):
         assert other[keys] == pytest.approx(total, abs=0.1)
 
 
-def test_what_was_kept_of_another_model_is_not_taken_up(tmp_path):
+def gone_on(folder, changed=None, criteria=None, energy="neo-hookean") -> bool:
+    """Whether a diagnosis that is begun in `folder` takes anything up; it is stopped soon."""
+    notes = Notes(2)
     with pytest.raises(KeyboardInterrupt):
-        asked(tmp_path, 4)
-    _, told = asked(tmp_path, energy="mooney-rivlin")
-    assert not any("going on" in s for s in told)
+        diagnose(
+            changed or sample(), energy, effects=("drift", "aging"), out=folder, progress=notes, criteria=criteria
+        )
+    return any("going on" in s for s in notes.said)
+
+
+def test_only_what_was_kept_of_the_same_question_is_taken_up(tmp_path, monkeypatch):
+    """Another model, one reading, the noise, a height, a number of the judgement, a line of the code."""
+    with pytest.raises(KeyboardInterrupt):
+        asked(tmp_path / "stopped", 4)
+
+    def anew() -> Path:
+        return shutil.copytree(tmp_path / "stopped", tmp_path / f"copy {len(list(tmp_path.iterdir()))}")
+
+    def with_last(**changed) -> Sample:
+        made = sample()
+        return replace(made, recordings=made.recordings | {"r3": replace(made.recordings["r3"], **changed)})
+
+    channel = sample().recordings["r3"].channels["nominal_stress"]
+    values = channel.values.copy()
+    values[7] += 1e-3
+    assert gone_on(anew())
+    assert not gone_on(anew(), energy="mooney-rivlin")
+    assert not gone_on(anew(), with_last(channels={"nominal_stress": replace(channel, values=values)}))
+    assert not gone_on(anew(), with_last(channels={"nominal_stress": replace(channel, noise_std=2.1)}))
+    assert not gone_on(anew(), with_last(attributes={"start": 201.0}))
+    assert not gone_on(anew(), criteria=Criteria(rig=0.11))
+    with monkeypatch.context() as edited:
+        edited.setattr(source, "LOADED", "another line")
+        assert not gone_on(anew())
