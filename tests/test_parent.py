@@ -1,5 +1,6 @@
 """Workers end with the process that they work for, also where it was killed and they are in the middle of a case."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import tissuejax
+from tissuejax.parent import pool
 
 BUSY = """
 import time
@@ -52,3 +54,13 @@ def test_workers_of_a_killed_process_are_gone_within_seconds(tmp_path, body, kil
 def test_every_pool_of_the_package_is_of_this_kind():
     room = Path(tissuejax.__file__).parent
     assert [p.name for p in room.rglob("*.py") if "ProcessPoolExecutor(" in p.read_text()] == ["parent.py"]
+
+
+@pytest.mark.parametrize(("workers", "threads"), [(1, None), (2, "1")])
+def test_several_workers_compute_on_one_thread_each(workers, threads, monkeypatch):
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    with pool(workers) as crew:
+        assert crew.submit(os.getenv, "OMP_NUM_THREADS").result() == threads
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    with pool(workers) as crew:
+        assert crew.submit(os.getenv, "OMP_NUM_THREADS").result() == "3"

@@ -3,18 +3,17 @@
 import multiprocessing
 import os
 import threading
-from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 
 
-def pool(workers: int, begin: Callable[[], object] | None = None) -> ProcessPoolExecutor:
+def pool(workers: int) -> ProcessPoolExecutor:
     """So many spawned processes, as JAX does not survive a fork; they end with this one, which calls them.
 
-    Args:
-        begin: what each does first; a function of a module.
+    Where there are several each computes on one thread, whatever its libraries would take: the work is shared out
+    already. What the environment says (`OMP_NUM_THREADS`, `XLA_FLAGS`) goes before.
     """
     context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, mp_context=context, initializer=_begun, initargs=(begin,))
+    return ProcessPoolExecutor(workers, mp_context=context, initializer=_begun, initargs=(workers > 1,))
 
 
 def leave_with_parent() -> None:
@@ -28,7 +27,8 @@ def leave_with_parent() -> None:
         threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
 
 
-def _begun(begin: Callable[[], object] | None) -> None:
+def _begun(one_thread: bool) -> None:
     leave_with_parent()
-    if begin is not None:
-        begin()
+    if one_thread:  # before JAX starts
+        os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")
+        os.environ.setdefault("OMP_NUM_THREADS", "1")

@@ -65,9 +65,7 @@ def gone_on(folder, changed=None, criteria=None, energy="neo-hookean") -> bool:
     """Whether a diagnosis that is begun in `folder` takes anything up; it is stopped soon."""
     notes = Notes(2)
     with pytest.raises(KeyboardInterrupt):
-        diagnose(
-            changed or sample(), energy, effects=("drift", "aging"), out=folder, progress=notes, criteria=criteria
-        )
+        diagnose(changed or sample(), energy, effects=("drift", "aging"), out=folder, progress=notes, criteria=criteria)
     return any("going on" in s for s in notes.said)
 
 

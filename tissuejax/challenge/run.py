@@ -58,15 +58,9 @@ def _each(folder: Path, cases: list[tuple[str, str]], jobs: int):
         for name, energy in cases:
             yield answer(folder, name, energy)
         return
-    with pool(jobs, _one_core) as crew:
+    with pool(jobs) as crew:
         for done in as_completed([crew.submit(answer, folder, name, energy) for name, energy in cases]):
             yield done.result()
-
-
-def _one_core() -> None:
-    """Before JAX starts in a worker: one thread each, the parallelism is in the cases."""
-    os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
 def answer(folder: Path, name: str, energy: str) -> str:
