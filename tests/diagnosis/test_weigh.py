@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 from scipy.stats import multivariate_normal
-from spring_bench import FREE, START, Spring, spring
+from spring_bench import FREE, START, Spring, judged, spring
 
 from tissuejax.diagnosis.bench import Candidate, Free
 from tissuejax.diagnosis.judgement.blocks import blocks, driven_states, series
@@ -16,6 +16,7 @@ from tissuejax.diagnosis.judgement.effort import Course, Effort
 from tissuejax.diagnosis.judgement.explore import Exploration
 from tissuejax.diagnosis.judgement.scales import scaled
 from tissuejax.diagnosis.judgement.weigh import Start, weigh
+from tissuejax.diagnosis.locate import locate
 from tissuejax.estimation.discrepancy import discrepancy
 
 FIBRES = Candidate("fibres", ("fibre.k",), ("fibre.onset",), ({"fibre.onset": 5.0},))
@@ -154,3 +155,26 @@ def test_where_the_fine_simulation_breaks_down_a_fit_stays_short_of_that(bench):
     assert np.isfinite(base.evidence.log_evidence)
     assert 6.0 < base.refit.values["b"] <= 12.0  # of 20 that describe the recordings best
     assert np.all(np.isfinite(base.refit.prediction))
+
+
+class Retaken(Spring):
+    """The same without fibres, which takes its correction from where a set was weighed."""
+
+    last, broken = 12.0, False
+    anchored, predict = Twofold.anchored, lambda self, *a: Spring.predict(self, *a) * (np.nan if self.broken else 1.0)
+
+    def corrected_as(self, other):
+        made = copy.copy(self)
+        made.broken = other.broken
+        return made
+
+
+def test_nor_does_what_is_shown_come_from_a_simulation_that_broke_down():
+    """The least-squares fit of the base, which is shown, lies where no fine simulation runs."""
+    sample = spring({})
+    sample.__class__ = Retaken
+    answer = judged(sample, Effort(most=1))
+    for fit in (answer.empty, answer.chosen):
+        assert np.all(np.isfinite(fit.prediction))
+        assert np.isfinite(fit.chi2)
+    assert all(np.isfinite(x.share) for x in locate(answer.bench, answer.empty.prediction))

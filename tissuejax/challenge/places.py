@@ -79,7 +79,9 @@ def stated_channels(located: Iterable[Mapping]) -> list[str]:
     """Channels ("force x", ..., "markers") that a result's `located` says hold most of the misfit."""
     channels: dict[str, float] = {}
     for x in located:
-        if x.get("kind") == "recording":
+        if (
+            x.get("kind") == "recording" and x["share"] is not None
+        ):  # none is said where what it is a share of broke down
             channels[str(x.get("channel"))] = channels.get(str(x.get("channel")), 0.0) + float(x["share"])
     return most_of(channels)
 

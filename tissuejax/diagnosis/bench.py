@@ -165,6 +165,10 @@ class Bench(abc.ABC):
         """The bench with predictions exact at `values`: itself, unless it corrects a cheaper simulation there."""
         return self
 
+    def corrected_as(self, other: "Bench") -> "Bench":
+        """The bench with the correction of another one of the same recordings; itself, unless it has any."""
+        return self
+
     def nearer(self, values: Mapping[str, float]) -> "Bench":
         """The bench with a correction taken anew at `values` where it was taken far away."""
         return self

@@ -132,6 +132,14 @@ class ProbingView(Bench):
         }
         return made
 
+    def corrected_as(self, other: Bench) -> "ProbingView":
+        """See `Bench.corrected_as`."""
+        if not isinstance(other, ProbingView):
+            return self
+        made = copy.copy(self)
+        made.shift, made.place, made._open = other.shift, other.place, other._open
+        return made
+
     def nearer(self, values: Mapping[str, float]) -> "ProbingView":
         """See `Bench.nearer`."""
         near = copy.copy(self)

@@ -6,7 +6,7 @@ their bound exactly and leave it when the data want them to. Positive shapes mov
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -280,3 +280,23 @@ def refit(
         dof=dof,
         free=bench.free,
     )
+
+
+def anchored(bench: Bench, fit: Refit, start: Mapping[str, float], shortened: int) -> tuple[Bench, Refit]:
+    """The bench corrected where a fit came to rest, and the fit; nearer to its start where the fine simulation fails.
+
+    A law that softens may be stable on a coarse mesh, where strains are averaged, and not on a fine one.
+
+    Returns:
+        The bench as it was, and a fit whose prediction is not finite, where `shortened` halvings lead to no fine
+        simulation either.
+    """
+    first = fit
+    for _ in range(shortened):
+        near = bench.anchored(fit.values)
+        if near is not bench or fit is not first:
+            fit = replace(fit, prediction=near.predict(fit.values))
+        if np.all(np.isfinite(fit.prediction)):
+            return near, fit
+        fit = replace(fit, values={p: 0.5 * (start.get(p, v) + v) for p, v in fit.values.items()})
+    return bench, fit

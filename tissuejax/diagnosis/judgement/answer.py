@@ -27,7 +27,7 @@ from tissuejax.diagnosis.judgement.search import explore
 from tissuejax.diagnosis.judgement.twins import merged
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.misfit import Misfit, white
-from tissuejax.diagnosis.refit import Refit, refit
+from tissuejax.diagnosis.refit import Refit, anchored, refit
 from tissuejax.diagnosis.score import Score
 from tissuejax.estimation.discrepancy import Discrepancy
 
@@ -207,7 +207,10 @@ def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
     """
     weighed, scales = out.exploration.weighed[frozenset(keys)], out.exploration.scales
     start = {p: v for p, v in weighed.refit.values.items() if p in out.fitting.free}
-    bench = out.fitting.anchored(start)
+    # corrected as the set was weighed: just where it came to rest the fine simulation may break down
+    bench = out.fitting if weighed.bench is None else out.fitting.corrected_as(weighed.bench)
+    near = bench.anchored(start)
+    bench = near if np.all(np.isfinite(near.predict(start))) else bench
     named, effort, twins = scales.widened(keys), out.exploration.effort, out.exploration.criteria.twins
     whitening = Whitening(bench, scales.cut, scales.blocked, weighed.parts, weighed.v, named)
     misfit = whitening if keys else white(bench)
@@ -237,9 +240,8 @@ def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
             ends.append((squares(left / bench.sigma[bench.mask(bench.fitted)]), near, taken))
         _, near, takes = min(ends, key=lambda end: end[0])
         fit = replace(refit(bench, misfit, keys, near.values, iterations=0), converged=near.converged)
-    near = bench.anchored(fit.values)
-    if near is not bench:
-        fit = replace(fit, prediction=near.predict(fit.values))
+    _, near = anchored(bench, fit, start, effort.course.shortened)
+    fit = near if np.all(np.isfinite(near.prediction)) else fit  # else of the simulation as it was corrected before
     fit = replace(fit, prediction=fit.prediction + carried(takes, (bench.y - fit.prediction)[:, None])[:, 0])
     out.plain[frozenset(keys)], out.whitenings[frozenset(keys)] = fit, whitening
     shown = out.bench

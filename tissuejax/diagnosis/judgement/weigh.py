@@ -31,7 +31,7 @@ from tissuejax.diagnosis.judgement.mass import amplitude_mass
 from tissuejax.diagnosis.judgement.rest import beyond, numerical, rest, unlike_noise, wobble
 from tissuejax.diagnosis.judgement.scales import Scales, log_prior, squared, with_priors
 from tissuejax.diagnosis.judgement.whitening import Whitening
-from tissuejax.diagnosis.refit import Descent, Refit, Resting, refit
+from tissuejax.diagnosis.refit import Descent, Refit, Resting, anchored, refit
 from tissuejax.estimation.discrepancy import Part
 
 FELT = 1e-6  # of the peak: what is no rounding, by its slope
@@ -144,7 +144,7 @@ def weigh(
         if not np.isfinite(fit.chi2):
             break
         if course.anchor:
-            bench, fit = _anchored(bench, fit, at, course.shortened)
+            bench, fit = anchored(bench, fit, at, course.shortened)
         if not np.max(np.abs(fit.prediction)) < WILD * scales.peak:
             break  # shares of it would cover all that was measured
         descent = Descent(bench, misfit, tuple(fit.values), names, {})
@@ -199,22 +199,6 @@ def weigh(
     if best is None:
         return _impossible(scales, keys)
     return replace(_described(scales, keys, best, criteria), settled=course.anchor, begun=dict(start.values))
-
-
-def _anchored(bench: Bench, fit: Refit, start: Mapping[str, float], shortened: int) -> tuple[Bench, Refit]:
-    """The bench corrected where a fit came to rest, and the fit; nearer to its start where the fine simulation fails.
-
-    A law that softens may be stable on a coarse mesh, where strains are averaged, and not on a fine one.
-    """
-    first = fit
-    for _ in range(shortened):
-        near = bench.anchored(fit.values)
-        if near is not bench or fit is not first:
-            fit = replace(fit, prediction=near.predict(fit.values))
-        if np.all(np.isfinite(fit.prediction)):
-            return near, fit
-        fit = replace(fit, values={p: 0.5 * (start.get(p, v) + v) for p, v in fit.values.items()})
-    return bench, fit  # its prediction is not finite, and ends the search
 
 
 def _amplitudes(
