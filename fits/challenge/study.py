@@ -22,14 +22,15 @@ CURRENT = {
                  "material-sixth", "material-seventh", "material-eighth", "material-ninth",
                  "material-tenth", "material-eleventh", "material-twelfth", "material-thirteenth"),
     "probing": ("probing", "probing-strong", "probing-strong-second", "probing-pairs", "probing-second",
-                "probing-strong-third", "probing-third", "probing-fourth", "probing-fifth", "probing-sixth"),
+                "probing-strong-third", "probing-third", "probing-fourth", "probing-fifth", "probing-sixth",
+                "probing-seventh"),
 }  # fmt: skip
 
 
 NEWEST = {
     "material tests": ("material-thirteenth",),
     "beside a rest": ("rest-seventh",),
-    "probings": ("probing-fifth", "probing-sixth"),
+    "probings": ("probing-seventh",),
 }  # the newest of each kind, of the judgements of their day
 
 

@@ -132,12 +132,6 @@ def test_no_filter_of_second_order_is_found_where_there_is_none(rng, rho):
     assert float(found.correlation(0.04)) == pytest.approx(rho, abs=0.09)
 
 
-def test_what_is_smooth_and_far_below_the_recorded_level_is_no_noise_of_that_level(rng):
-    """Noise stated twenty times too large beside a mismatch: its shape is not that of the noise."""
-    left = [Series(FAST, (0.05 * rng.normal(size=626) + 0.3 * mismatch(FAST))[:, None]) for _ in range(3)]
-    assert estimate(left, orders=(1, 2)).noises[0].share < 0.05
-
-
 @pytest.mark.parametrize("level", [0.5, 2.0])
 def test_white_noise_of_another_size_than_recorded_stays_white(rng, level):
     found = estimate([Series(FAST, level * rng.normal(size=(626, 1)) + mismatch(FAST)[:, None]) for _ in range(2)])

@@ -62,6 +62,7 @@ def white(bench: Bench) -> Misfit:
 def estimated(bench: Bench, prediction: Float[np.ndarray, " N"]) -> Misfit:
     """The misfit under noise whose correlation in time is estimated from the residuals of the fitted recordings.
 
+    Behind a low-pass of second order noise is told from a mismatch by its level, so only where one was recorded.
     Held-out recordings take no part; theirs is that of the fitted ones, of the longest where these differ.
     """
     noises = {}
@@ -75,7 +76,7 @@ def estimated(bench: Bench, prediction: Float[np.ndarray, " N"]) -> Misfit:
             Series(own[0].time, np.stack([(bench.y - prediction)[s.rows] / bench.sigma[s.rows] for s in own], axis=1))
             for own in alike
         ]
-        found = estimate(series, orders=(1, 2))
+        found = estimate(series, orders=(1,) if bench.estimated else (1, 2))
         noises |= {(name, channel): noise for name, noise in zip(blocks, found.noises, strict=True)}
         if blocks:
             longest = max(blocks, key=lambda name: len(blocks[name][0].time))

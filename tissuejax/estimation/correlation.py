@@ -41,6 +41,7 @@ SHARES, TAUS, WALKS = 6, 7, 9  # tried at once of the share, the time, the inten
 ROUNDS = 3  # of trials, each in a narrower range
 DIFFUSE = 1e4  # prior variance of the mismatch's level over that of the residual
 NEVER_WHITE = {1: 1e-3, 2: 1e-6}  # least share of white noise that is tried, by order: a filter leaves next to none
+LOGITS = -4.5, {1: 6.5, 2: 13.5}  # of the shares that are tried
 UNLIKE = 1.1  # ratio of sampling steps from which a filter in seconds and one in samples are two things
 
 
@@ -200,8 +201,7 @@ def _best(surfaces: Sequence[_Surface], orders: tuple[int, ...] = (1,)) -> _Foun
     """White noise or, if that is clearly better, correlated; of the recorded level unless that is clearly wrong.
 
     Whether it is correlated is asked with the level free: a level that is a little off must not be read as a shape.
-    What is correlated at a small part of the recorded level everywhere is no noise of that level, and a rest. Where
-    white noise of the level is seen, no filter of second order was passed, and none is sought.
+    Where white noise of the level is seen, no filter of second order was passed, and none is sought.
     """
     maps = [s(np.zeros(1), np.ones(1), s.walks(s.least, s.most, SHARES * TAUS), True) for s in surfaces]
     white = _Found(0.0, 1.0, sum(float(t[0][0, 0]) for t in maps), [math.sqrt(t[2][0, 0]) for t in maps])
@@ -213,7 +213,7 @@ def _best(surfaces: Sequence[_Surface], orders: tuple[int, ...] = (1,)) -> _Foun
         clocks = (False, True) if unlike else (False,)
         second = max((_correlated(surfaces, alone, True, 2, clock) for clock in clocks), key=lambda f: f.likelihood)
         found = second if 2 * (second.likelihood - found.likelihood) > (GAIN if capped else 0) else found
-    if 2 * (found.likelihood - white.likelihood) <= GAIN or (capped and not found.seen):
+    if 2 * (found.likelihood - white.likelihood) <= GAIN:
         return replace(white, apart=found.apart)
     if not capped:
         return found
@@ -242,7 +242,7 @@ def _correlated(
         order, sampled = near.order, near.sampled
     never = NEVER_WHITE[order]
     units = [s.step if sampled else 1.0 for s in surfaces]
-    logits = np.linspace(-4.5, math.log(1 / never - 1), SHARES)
+    logits = np.linspace(LOGITS[0], LOGITS[1][order], SHARES)
     least, most = (min(s.step / u for s, u in zip(surfaces, units)), max(s.span / u for s, u in zip(surfaces, units)))
     logs = np.linspace(math.log(least / 3), math.log(most / 3), TAUS)
     if near is not None:
