@@ -7,7 +7,7 @@ from tissuejax.diagnosis.judgement.criteria import Criteria
 
 # What sets are fitted and weighed by is in their evidence already: these want the diagnoses run again.
 WEIGHED = ("unknown", "shares", "strange", "partly", "sudden", "change", "rig", "shape", "loose", "alike", "misstated")
-WEIGHED += ("smooth", "shown", "means", "simulated", "strokes")  # fits/real-panel/matters.py asks these
+WEIGHED += ("unseen", "smooth", "shown", "means", "simulated", "strokes")  # fits/real-panel/matters.py asks these
 
 
 def settings() -> Iterator[tuple[str, Criteria]]:
@@ -24,8 +24,7 @@ def settings() -> Iterator[tuple[str, Criteria]]:
         yield f"sizes {sizes}", replace(usual, sizes=sizes)
     for fault in (1.0, 0.3, 0.02):
         yield f"fault {fault:g}", replace(usual, fault=fault)
-    for name in ("unseen", "covered"):
-        value = getattr(usual, name)
-        for factor in (0.5, 2.0):
-            other = min(factor * value, 0.99) if isinstance(value, float) and value < 1 else type(value)(factor * value)
-            yield f"{name} {other:g}", replace(usual, **{name: other})
+    for lapse in (0.0, 0.1, 0.4):  # of simulated experiments alone
+        yield f"lapse {lapse:g}", replace(usual, lapse=lapse)
+    for covered in (0.45, 0.99):
+        yield f"covered {covered:g}", replace(usual, covered=covered)

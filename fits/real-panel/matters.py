@@ -35,10 +35,10 @@ from study import file_of  # noqa: E402
 import tissuejax as tj  # noqa: E402
 from tissuejax.challenge.panel import Answer, answered, read_causes  # noqa: E402
 from tissuejax.diagnosis.diagnose import asked_of  # noqa: E402
+from tissuejax.diagnosis.judgement import rejudge  # noqa: E402
 from tissuejax.diagnosis.judgement.evidence import read_evidence, write_evidence  # noqa: E402
 from tissuejax.diagnosis.judgement.judge import judge  # noqa: E402
 from tissuejax.diagnosis.judgement.numbers import Numbers  # noqa: E402
-from tissuejax.diagnosis.judgement.rejudge import verdict_of  # noqa: E402
 from tissuejax.diagnosis.judgement.reweigh import Found, reweighed  # noqa: E402
 from tissuejax.errors import InputError  # noqa: E402
 from tissuejax.progress import for_terminal  # noqa: E402
@@ -52,9 +52,9 @@ EVERY, FACTORS = int(os.environ.get("MATTERS_EVERY", "4")), (0.5, 2.0)
 SEARCHED = ("effort", "criteria.shown", "criteria.means", "criteria.sudden", "criteria.shares.sudden")
 SEARCHED += tuple(f"criteria.smooth.{name}" for name in ("clock", "edge", "moments"))
 # A judge alone reads these: the sets as they are weighed usually, judged again.
-JUDGED = tuple(f"criteria.{name}" for name in ("sizes", "coarse", "negligible", "named", "covered", "strong"))
+JUDGED = tuple(f"criteria.{name}" for name in rejudge.JUDGED if name != "lapse")
 # Of other kinds of recordings, or of a page: no sample of the panel feels them.
-ELSEWHERE = ("criteria.simulated", "criteria.strokes", "criteria.unseen", "criteria.twins")
+ELSEWHERE = ("criteria.lapse", "criteria.simulated", "criteria.strokes", "criteria.unseen", "criteria.twins")
 ELSEWHERE += tuple(f"effort.{name}" for name in ("promised", "shown", "rivals", "course.shortened"))
 ELSEWHERE += tuple(f"criteria.shares.{name}" for name in ("marker", "onset", "peak", "numerical"))
 USUAL = "as they are"
@@ -93,21 +93,21 @@ def searched(entry: panel_samples.Entry, at: Numbers) -> tuple[dict, Found]:
         sample, entry.energy, holdout=held, ogden_form=entry.ogden_form, criteria=at.criteria, effort=at.effort
     )
     found = Found.of(said.answered.exploration, said.answered.evidence.held_out)
-    return verdict_of(said.answered.judgement, at.criteria), found
+    return rejudge.verdict_of(said.answered.judgement, at.criteria), found
 
 
 def weighed(entry: panel_samples.Entry, path: str, at: Numbers, found: Found) -> dict:
     """The verdict of the sets found, weighed again; judged again where only a judge reads the number."""
     usual = file_of(RUNS, entry.id, "evidence")
     if under(path, JUDGED):
-        return verdict_of(judge(read_evidence(usual), at.criteria), at.criteria)
+        return rejudge.verdict_of(judge(read_evidence(usual), at.criteria), at.criteria)
     sample, held = panel_samples.build(entry)
     asked = asked_of(sample, entry.energy, held, entry.ogden_form, criteria=at.criteria)
     cut, of = asked.left()
     evidence = reweighed(asked.whole, cut, of, found, at.criteria)
     if path == USUAL:
         write_evidence(evidence, usual)
-    return verdict_of(judge(evidence, at.criteria), at.criteria)
+    return rejudge.verdict_of(judge(evidence, at.criteria), at.criteria)
 
 
 def answer(entry: panel_samples.Entry, path: str, factor: float) -> None:

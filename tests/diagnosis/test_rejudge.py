@@ -6,13 +6,16 @@ evidences L and 0 and a power p the odds of the effect are sizes[1] / (2 sizes[0
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 
 from tissuejax.cli import main
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence, SetEvidence, read_evidence, write_evidence
-from tissuejax.diagnosis.judgement.rejudge import rejudge
+from tissuejax.diagnosis.judgement.judge import Kind, judge
+from tissuejax.diagnosis.judgement.numbers import Numbers
+from tissuejax.diagnosis.judgement.rejudge import JUDGED, rejudge, verdict_of
 from tissuejax.errors import InputError
 
 USUAL = Criteria()
@@ -89,6 +92,35 @@ def test_what_can_not_be_judged_is_refused(stored, tmp_path, capsys):
     (stored / "results" / "shown" / "evidence.json").write_text("{}")
     with pytest.raises(InputError, match="no evidence of a diagnosis"):
         rejudge(stored)
+
+
+class Read(Criteria):
+    """Notes which numbers are asked for."""
+
+    def __getattribute__(self, name):
+        if name in USUAL.__dataclass_fields__:
+            ASKED.add(name)
+        return super().__getattribute__(name)
+
+
+ASKED: set[str] = set()
+
+
+def test_a_number_that_no_judge_reads_is_refused_and_every_other_is_read(stored, capsys):
+    """Asked of evidence it would change nothing, whatever it were: an answer that says nothing."""
+    ASKED.clear()
+    three = read_evidence(stored / "results" / "shown" / "evidence.json")
+    sets = [a_set((), 0.0)] + [a_set((name,), 4.0) for name in three.forms]
+    both = replace(three, sets=tuple(sets), simulated=True, faults=(*three.forms,))
+    criteria = Read()
+    judged = judge(both, criteria)
+    assert judged.kind is Kind.AMBIGUOUS
+    verdict_of(judged, criteria)
+    assert {*JUDGED} == ASKED
+    for name in USUAL.__dataclass_fields__.keys() - {*JUDGED}:
+        path = next(p for p in Numbers().all() if p.split(".")[1] == name) if name != "settled" else "criteria.rig"
+        assert main(["challenge", "judge", str(stored), "--number", f"{path}=1"]) == 2
+        assert "run again" in capsys.readouterr().err
 
 
 def test_evidence_of_before_is_still_read(stored):

@@ -13,7 +13,7 @@ from tissuejax.commands.arguments import positive, seed
 from tissuejax.commands.command import Command, Reply
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.numbers import Numbers
-from tissuejax.diagnosis.judgement.rejudge import rejudge
+from tissuejax.diagnosis.judgement.rejudge import JUDGED, rejudge
 from tissuejax.errors import InputError
 from tissuejax.progress import for_terminal
 from tissuejax.report.challenge_table import figures
@@ -138,4 +138,10 @@ def _criteria(text: str) -> Criteria:
         raise InputError(f"--number {text}: give one as criteria.coarse=100") from error
     if not path.startswith("criteria."):
         raise InputError(f"--number {text}: evidence is judged by the criteria alone; give one as criteria.coarse=100")
-    return Numbers().having(path, number).criteria
+    changed = Numbers().having(path, number).criteria
+    if path.split(".")[1] not in JUDGED:
+        raise InputError(
+            f"--number {text}: sets are searched and weighed by it, and what it did is in the evidence already; judged "
+            f"by are {', '.join(f'criteria.{name}' for name in JUDGED)}, any other asks for the diagnoses run again"
+        )
+    return changed

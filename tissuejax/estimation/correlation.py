@@ -40,8 +40,8 @@ GAIN = 8.0  # twice the log-likelihood by which correlated noise must beat white
 SHARES, TAUS, WALKS = 6, 7, 9  # tried at once of the share, the time, the intensity of the walk: one program
 ROUNDS = 3  # of trials, each in a narrower range
 DIFFUSE = 1e4  # prior variance of the mismatch's level over that of the residual
-NEVER_WHITE = {1: 1e-3, 2: 1e-6}  # least share of white noise that is tried, by order: a filter leaves next to none
-LOGITS = -4.5, {1: 6.5, 2: 13.5}  # of the shares that are tried
+NEVER_WHITE, FILTERED = 1e-3, 1e-6  # least share of white noise that is tried; of a recorded level behind a filter
+LOGITS = -4.5, 6.5, 13.5  # of the shares that are tried: the least, and the greatest of either
 UNLIKE = 1.1  # ratio of sampling steps from which a filter in seconds and one in samples are two things
 
 
@@ -208,7 +208,7 @@ def _best(surfaces: Sequence[_Surface], orders: tuple[int, ...] = (1,)) -> _Foun
     alone = [float(t[0][0, 0]) for t in maps]
     capped = surfaces[0].capped
     found = _correlated(surfaces, alone, True, min(orders))
-    if 2 in orders and (not capped or 2 * (found.likelihood - white.likelihood) > GAIN or not white.seen):
+    if 2 in orders and not (capped and white.seen):
         unlike = max(s.step for s in surfaces) > UNLIKE * min(s.step for s in surfaces)
         clocks = (False, True) if unlike else (False,)
         second = max((_correlated(surfaces, alone, True, 2, clock) for clock in clocks), key=lambda f: f.likelihood)
@@ -240,9 +240,10 @@ def _correlated(
     """
     if near is not None:
         order, sampled = near.order, near.sampled
-    never = NEVER_WHITE[order]
+    behind = order == 2 and surfaces[0].capped
+    never = FILTERED if behind else NEVER_WHITE
     units = [s.step if sampled else 1.0 for s in surfaces]
-    logits = np.linspace(LOGITS[0], LOGITS[1][order], SHARES)
+    logits = np.linspace(LOGITS[0], LOGITS[2 if behind else 1], SHARES)
     least, most = (min(s.step / u for s, u in zip(surfaces, units)), max(s.span / u for s, u in zip(surfaces, units)))
     logs = np.linspace(math.log(least / 3), math.log(most / 3), TAUS)
     if near is not None:

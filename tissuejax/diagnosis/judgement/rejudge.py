@@ -9,6 +9,9 @@ from tissuejax.diagnosis.judgement.judge import Judgement, Kind, covering, judge
 from tissuejax.errors import InputError
 from tissuejax.storage import write_json
 
+# The criteria that a judge reads; by the others sets are searched and weighed, and what they did is in the evidence.
+JUDGED = ("sizes", "fault", "coarse", "lapse", "negligible", "named", "covered", "strong")
+
 
 def verdict_of(j: Judgement, criteria: Criteria | None = None) -> dict:
     """The part of `result.json` that the judgement alone decides; effects by name."""
