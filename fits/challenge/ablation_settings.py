@@ -10,8 +10,12 @@ WEIGHED = ("unknown", "shares", "strange", "partly", "sudden", "change", "rig", 
 WEIGHED += ("unseen", "smooth", "shown", "means", "simulated", "strokes")  # fits/real-panel/matters.py asks these
 
 
-def settings() -> Iterator[tuple[str, Criteria]]:
-    """The criteria as they are, and with one number changed, of all that a judge reads (all but `WEIGHED`)."""
+def settings(simulated: bool) -> Iterator[tuple[str, Criteria]]:
+    """The criteria as they are, and with one number changed, of all that a judge reads (all but `WEIGHED`).
+
+    Args:
+        simulated: whether predictions were simulations, which alone have a lapse.
+    """
     usual = Criteria()
     yield "as they are", usual
     for coarse in (25.0, 50.0, 100.0, 150.0, 300.0, 1000.0, 1e9):
@@ -24,7 +28,7 @@ def settings() -> Iterator[tuple[str, Criteria]]:
         yield f"sizes {sizes}", replace(usual, sizes=sizes)
     for fault in (1.0, 0.3, 0.02):
         yield f"fault {fault:g}", replace(usual, fault=fault)
-    for lapse in (0.0, 0.1, 0.4):  # of simulated experiments alone
+    for lapse in (0.0, 0.1, 0.4) if simulated else ():
         yield f"lapse {lapse:g}", replace(usual, lapse=lapse)
     for covered in (0.45, 0.99):
         yield f"covered {covered:g}", replace(usual, covered=covered)

@@ -34,7 +34,7 @@ def main(folder: Path) -> None:
         if result.exists() and runs.exists():
             stored[cause.id] = (json.loads(result.read_text()), read_evidence(runs))
     found, rows = {}, []
-    for label, criteria in settings():
+    for label, criteria in settings(simulated=False):
         marks = [
             answered(c, stored[c.id][0] | verdict_of(judge(stored[c.id][1], criteria), criteria), words)
             for c in causes
