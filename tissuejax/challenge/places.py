@@ -63,15 +63,20 @@ def most_of(shares: Mapping[str, float]) -> list[str]:
     return sorted(found)
 
 
+def _share(x: Mapping) -> float:
+    """Of the misfit; nothing where a result has none, because what it would be a share of broke down."""
+    return float(x["share"] or 0.0)
+
+
 def stated(located: Iterable[Mapping]) -> tuple[list[str], list[str]]:
     """(recordings, phases) that a result's `located` says hold most of the misfit."""
     recordings, kinds = {}, {}
     for x in located:
         if x.get("kind") == "recording":
-            recordings[x["recording"]] = recordings.get(x["recording"], 0.0) + float(x["share"])
+            recordings[x["recording"]] = recordings.get(x["recording"], 0.0) + _share(x)
         elif x.get("kind") == "phase":
             name = x.get("phase") or next((p for p in PHASES if p in str(x.get("what")).split()), "")
-            kinds[name] = kinds.get(name, 0.0) + float(x["share"])
+            kinds[name] = kinds.get(name, 0.0) + _share(x)
     return most_of(recordings), most_of(kinds)
 
 
@@ -79,10 +84,8 @@ def stated_channels(located: Iterable[Mapping]) -> list[str]:
     """Channels ("force x", ..., "markers") that a result's `located` says hold most of the misfit."""
     channels: dict[str, float] = {}
     for x in located:
-        if (
-            x.get("kind") == "recording" and x["share"] is not None
-        ):  # none is said where what it is a share of broke down
-            channels[str(x.get("channel"))] = channels.get(str(x.get("channel")), 0.0) + float(x["share"])
+        if x.get("kind") == "recording":
+            channels[str(x.get("channel"))] = channels.get(str(x.get("channel")), 0.0) + _share(x)
     return most_of(channels)
 
 

@@ -208,7 +208,7 @@ def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:
     weighed, scales = out.exploration.weighed[frozenset(keys)], out.exploration.scales
     start = {p: v for p, v in weighed.refit.values.items() if p in out.fitting.free}
     # corrected as the set was weighed: just where it came to rest the fine simulation may break down
-    bench = out.fitting if weighed.bench is None else out.fitting.corrected_as(weighed.bench)
+    bench = out.fitting.corrected_as(weighed.bench or out.fitting)
     near = bench.anchored(start)
     bench = near if np.all(np.isfinite(near.predict(start))) else bench
     named, effort, twins = scales.widened(keys), out.exploration.effort, out.exploration.criteria.twins
