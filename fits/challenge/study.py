@@ -20,7 +20,8 @@ BEGIN, END = "<!-- pooled: written by the study -->", "<!-- end of pooled -->"
 CURRENT = {
     "material": ("material", "material-second", "material-third", "material-fourth", "material-fifth",
                  "material-sixth", "material-seventh", "material-eighth", "material-ninth",
-                 "material-tenth", "material-eleventh", "material-twelfth", "material-thirteenth"),
+                 "material-tenth", "material-eleventh", "material-twelfth", "material-thirteenth",
+                 "material-fourteenth"),
     "probing": ("probing", "probing-strong", "probing-strong-second", "probing-pairs", "probing-second",
                 "probing-strong-third", "probing-third", "probing-fourth", "probing-fifth", "probing-sixth",
                 "probing-seventh"),
@@ -28,7 +29,7 @@ CURRENT = {
 
 
 NEWEST = {
-    "material tests": ("material-thirteenth",),
+    "material tests": ("material-thirteenth", "material-fourteenth"),
     "beside a rest": ("rest-seventh",),
     "probings": ("probing-seventh",),
 }  # the newest of each kind, of the judgements of their day
