@@ -10,7 +10,8 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
-LONG = ("which-ogden-form", "probing-stl", "probing-fit", "diagnose", "real-time")  # run by `make slow`
+# run by `make slow`
+LONG = ("which-ogden-form", "probing-stl", "probing-fit", "diagnose", "real-time", "probing-simulate", "cut")
 LARGEST = 200_000  # bytes of a stored notebook
 NEAR, SMALL = 0.1, 1e-2  # numbers printed again: this near, or both this small (errors, differences)
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")

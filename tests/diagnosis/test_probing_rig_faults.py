@@ -73,9 +73,8 @@ def diagnosed(simulated, fault, tried) -> Answered:
 FAULTS = {"force-hum": humming, "specimen-scatter": scattered, "hysteresis": looping}
 
 
-@pytest.mark.parametrize(
-    "name", ["force-hum", *(pytest.param(n, marks=pytest.mark.slow) for n in FAULTS if n != "force-hum")]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FAULTS)
 def test_a_fault_of_the_force_is_named(simulated, name):
     found = diagnosed(simulated, FAULTS[name], tuple(FAULTS))
     assert found.judgement.names == (name,)

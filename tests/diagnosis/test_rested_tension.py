@@ -26,7 +26,8 @@ def stress(stretch, time):
     return l * out[0] - out[1] / l**2
 
 
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1])
 def test_relaxation_and_slack_are_found_together(seed):
     """Beside relaxation alone a small step of the gap gains nothing, since the law has taken up the rest: the pair has
     to be begun where the gap stood alone; in the second draw another form of slack promises more by its first step."""

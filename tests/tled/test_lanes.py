@@ -85,7 +85,10 @@ SIDES = Wedge(8e-3, 0.3, 2e-3, side=np.tile([1.0, 1.0, -1.0, -1.0], 4))  # of th
 
 
 FORMS = {"ball": Sphere(4e-3), "flat punch": Punch(3e-3, 1e-3), "blade": SIDES}
-PAIRS = [pytest.param(form, False, id=f"bare-{name}") for name, form in FORMS.items()]
+PAIRS = [
+    pytest.param(form, False, id=f"bare-{name}", marks=[pytest.mark.slow] * (name == "flat punch"))
+    for name, form in FORMS.items()
+]
 PAIRS += [  # half a minute each, most of it XLA's compiling
     pytest.param(form, True, id=f"friction and adhesion-{name}", marks=[pytest.mark.slow] * (name != "ball"))
     for name, form in FORMS.items()
@@ -128,7 +131,9 @@ def test_contact_in_c_is_contact_by_xla(monkeypatch, form, rough):
     assert np.abs(known[0][0][0]).max() > 1e-3
 
 
-@pytest.mark.parametrize("law", ["bilinear", "trapezoidal", "exponential"])
+@pytest.mark.parametrize(
+    "law", ["bilinear", *(pytest.param(n, marks=pytest.mark.slow) for n in ("trapezoidal", "exponential"))]
+)
 def test_faces_in_c_are_faces_by_xla(monkeypatch, law):
     """Forces, memory and losses after two openings, tangents and gradients; 20 faces, no multiple of a block's 16."""
     strength = 3000.0 * (1 + 0.01 * np.arange(20))  # of each face's own
