@@ -114,6 +114,15 @@ def test_what_has_no_answer_says_so():
         statics.checked(statics.compiled(cases.plain(BLOCK, np.arange(2.0), gravity=DOWN), most=25))
 
 
+@pytest.mark.parametrize(("precision", "said"), [(jnp.float32, True), (jnp.float64, False)])
+def test_a_search_that_stalls_in_single_precision_says_what_to_switch_on(precision, said):
+    lost = jnp.full((4, 3), jnp.nan, precision)
+    stalled = statics.Equilibrium(lost, jnp.asarray(2e-3), jnp.asarray(25), jnp.zeros(3), jnp.asarray(False))
+    with pytest.raises(NotConverged, match="unbalanced force 2.0e-03") as refusal:
+        statics.checked(stalled)
+    assert ("jax_enable_x64" in str(refusal.value)) == said
+
+
 @pytest.mark.parametrize(("longest", "last"), [(0.3, 1.0), (1 / 64, 1.0), (0.99 / 64, 0.0)])
 def test_a_load_is_led_in_steps_that_find_their_equilibrium(monkeypatch, longest, last):
     """Of a search that finds equilibrium only so near to the last one: halved down to a 64th of the way it arrives,

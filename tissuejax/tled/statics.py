@@ -227,7 +227,12 @@ def _how(found: Equilibrium) -> str:
     residual = float(found.residual)
     if bool(found.inverted):
         return "an element came out inverted"
-    return f"unbalanced force {residual:.1e} of the greatest" if 0 <= residual < jnp.inf else "it burst"
+    if not 0 <= residual < jnp.inf:
+        return "it burst"
+    said = f"unbalanced force {residual:.1e} of the greatest"
+    if found.displacement.dtype == jnp.float32:
+        said += " in single precision, which stalls there (`jax.config.update('jax_enable_x64', True)` first)"
+    return said
 
 
 def checked(found: Equilibrium) -> Equilibrium:
@@ -239,7 +244,7 @@ def checked(found: Equilibrium) -> Equilibrium:
     if not bool(jnp.isfinite(found.displacement).all()):
         raise NotConverged(
             f"no static equilibrium after {int(found.iterations)} iterations: {_how(found)}; check loads and support, "
-            "use double precision, allow more iterations, or come nearer in smaller steps (`statics.gradual`)"
+            "allow more iterations, or come nearer in smaller steps (`statics.gradual`)"
         )
     return found
 
