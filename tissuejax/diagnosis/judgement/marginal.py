@@ -21,6 +21,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.blas import dtrsm
 from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.optimize import lsq_linear
 
@@ -122,16 +123,20 @@ class Blocked:
         return out
 
 
-def inverted(block: Float[np.ndarray, "n n"]) -> tuple[Float[np.ndarray, "n n"], float]:
-    """Inverse and log determinant of a covariance."""
+def root(block: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "n n"]:
+    """Lower Cholesky factor of a covariance; its upper triangle is zero."""
     c, info = dpotrf(block, lower=1)
     if info:
         raise np.linalg.LinAlgError("a covariance is not positive definite")
+    return c
+
+
+def inverted(c: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "n n"]:
+    """Inverse of a covariance, from its factor."""
     low, _ = dpotri(c, lower=1)  # the other triangle is zero
-    log_det = 2 * float(np.sum(np.log(np.diag(c))))
     whole = low + low.T
-    whole.flat[:: len(block) + 1] *= 0.5
-    return whole, log_det
+    whole.flat[:: len(c) + 1] *= 0.5
+    return whole
 
 
 def smooth(parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> Float[np.ndarray, "N q"]:
@@ -143,30 +148,35 @@ def smooth(parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> Float[np.ndarra
 
 def marginal(linear: Linear, parts: Sequence[Part], v: Float[np.ndarray, " K"], blocked: Blocked) -> Marginal:
     """See the module's text."""
-    inverse, log_det = zip(*(inverted(b) for b in blocked.within(parts, v)), strict=True)
-
-    def solve(x: np.ndarray) -> np.ndarray:
-        return np.concatenate([i @ x[rows] for i, rows in zip(inverse, blocked.rows, strict=True)])
-
+    roots = [root(b) for b in blocked.within(parts, v)]
     u = smooth(parts, v)
     q = u.shape[1]
     w = np.concatenate([u, linear.jacobian], axis=1)
     prior = np.concatenate([np.ones(q), linear.weak])
     offset = np.concatenate([np.zeros(q), linear.offset])
-    g = solve(w)
-    m = w.T @ g + np.diag(prior)
+    # L^-1 of columns and residual, with D = LL'; inverses are for derivatives, which one in fifteen is asked for
+    both = np.concatenate([w, linear.residual[:, None]], axis=1)
+    white = np.concatenate([dtrsm(1.0, l, both[rows], lower=1) for l, rows in zip(roots, blocked.rows, strict=True)])
+    columns, z = white[:, :-1], white[:, -1]
+    m = columns.T @ columns + np.diag(prior)
     size = 1 / np.sqrt(np.maximum(np.diag(m), 1e-300))
     c = factored(m * np.outer(size, size))
-    dr = solve(linear.residual)
-    b = g.T @ linear.residual - prior * offset
+    b = columns.T @ z - prior * offset
     found = size * cho_solve(c, size * b, check_finite=False)
-    left = dr - g @ found  # K^-1 of what the parameters leave
-    quadratic = float(linear.residual @ dr + offset @ (prior * offset) - b @ found)
+    quadratic = float(z @ z + offset @ (prior * offset) - b @ found)
+    log_det = 2 * sum(float(np.sum(np.log(np.diag(l)))) for l in roots)
     # |M| = |I + U'D^-1U| |H|, and |K| = |D| |I + U'D^-1U|
     own = 2 * float(np.sum(np.log(np.diag(c[0])) - np.log(size)))
-    value = -0.5 * (quadratic + sum(log_det) + own + len(dr) * math.log(2 * math.pi))
+    value = -0.5 * (quadratic + log_det + own + len(z) * math.log(2 * math.pi))
 
-    def derivatives() -> tuple[np.ndarray, np.ndarray]:
+    def derivatives() -> tuple[np.ndarray, np.ndarray, dict[int, tuple]]:
+        inverse = [inverted(l) for l in roots]
+
+        def solve(x: np.ndarray) -> np.ndarray:
+            return np.concatenate([i @ x[rows] for i, rows in zip(inverse, blocked.rows, strict=True)])
+
+        g = solve(w)
+        left = solve(linear.residual) - g @ found  # K^-1 of what the parameters leave
         half = g @ (size[:, None] * cho_solve(c, np.diag(size), check_finite=False))  # g M^-1
         return _derivatives(parts, blocked, inverse, g, half, left)
 
