@@ -1,6 +1,7 @@
 """Contact is not passed through unsaid; step and penalty follow the pressed tissue; failures have their name."""
 
 import warnings
+from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
@@ -13,7 +14,7 @@ from tissuejax.energies.volumetric import Quadratic
 from tissuejax.errors import CoarseMesh, NotConverged, UnstableSimulation
 from tissuejax.mesh.columns import box
 from tissuejax.recordings.recording import Geometry
-from tissuejax.tled import build, gravity, pressed, statics
+from tissuejax.tled import build, gravity, pressed, statics, verdict
 from tissuejax.tled.shapes import Hemisphere, Platen, Sphere
 from tissuejax.tled.simulate import run
 
@@ -208,6 +209,25 @@ def test_a_breakdown_away_from_the_probe_is_put_down_to_gravity_or_the_support()
     )  # fmt: skip
     with pytest.raises(UnstableSimulation, match="gravity or the support breaks it. The weight of the tissue's height"):
         run(scene)
+
+
+@pytest.mark.parametrize(("deep", "said"), [(0.009, True), (0.001, False)])
+def test_a_breakdown_below_the_surface_is_the_probes_where_its_tip_has_come_near(deep, said):
+    """A ball of 3 mm on tissue with weight; an element 7.5 mm below the surface, two and a half radii, breaks down.
+
+    Pressed 9 mm the tip has gone past it; pressed 1 mm it has not come within two radii.
+    """
+    g, radius, top = box((0.02, 0.02, 0.02), (4, 4, 4)), 0.003, 0.02
+    path = np.array([[0.0, 0.0, top + radius + 1e-3], [0.0, 0.0, top + radius - deep]])
+    scene = tissue(
+        ReducedPolynomial(order=1), cases.NEO, 15e3, g, times=(np.arange(20) + 0.5) * 0.05, gravity=(0, 0, -9.81),
+        probe_path=build.ProbePath(np.array([0.0, 1.0]), path, radius),
+    )  # fmt: skip
+    centres = np.asarray(g.points)[np.asarray(g.cells)].mean(1)
+    below = int(np.linalg.norm(centres - [0.0025, 0.0025, 0.0125], axis=1).argmin())
+    out = SimpleNamespace(element=below, failed=1, end_time=np.array([0.5, 1.0]))
+    assert verdict._under_probe(out, scene) == said
+    assert verdict.shorter_helps(out, scene) == said
 
 
 def test_statics_raise_their_margin_by_themselves():

@@ -14,7 +14,8 @@ from tissuejax.tled.stable import critical_steps
 if TYPE_CHECKING:
     from tissuejax.tled.simulate import Outcome
 
-NEAR = 1.0  # radii around the probe's patch within which a breakdown is put down to the probe
+NEAR = 1.0  # radii around the probe's patch, and around where its tip has been: a breakdown there is the probe's
+STOPS = 65  # places of the tip's way that are looked at
 
 
 def halved(scene: Scene) -> Scene:
@@ -29,7 +30,7 @@ def halved(scene: Scene) -> Scene:
 
 def shorter_helps(out: "Outcome", scene: Scene) -> bool:
     """Whether a shorter step may cure the breakdown: not where gravity crushes a support."""
-    return _under_probe(int(out.element), scene) or scene.gravity is None or _too_long(scene)
+    return _under_probe(out, scene) or scene.gravity is None or _too_long(scene)
 
 
 def _too_long(scene: Scene) -> bool:
@@ -75,7 +76,7 @@ def _broken(out, scene) -> str:
             f"The step is above the critical one, {1e3 * critical.min():.3g} ms in element {int(critical.argmin())}. "
             "Take a smaller step (stiffer parameters need one)"
         )
-    if _under_probe(element, scene):
+    if _under_probe(out, scene):
         return said + (
             "Take a smaller step (stiffer parameters need one), less time compression, less stiffness damping, or a "
             "finer mesh under the probe"
@@ -128,10 +129,16 @@ def _folded(out, scene, block: int) -> str:
     )
 
 
-def _under_probe(element: int, scene: Scene) -> bool:
+def _under_probe(out, scene: Scene) -> bool:
+    """Whether the element that broke down lies at the patch, or where the tip came near on its way down."""
     if scene.probe is None:
         return False
-    points = np.asarray(scene.body.points)
-    here = points[np.asarray(scene.body.cells)[element]].mean(0)
-    facets = points[np.asarray(scene.probe.patch)].mean(1)
-    return bool(np.linalg.norm(facets - here, axis=1).min() <= NEAR * float(contact.breadth(scene)))
+    points, cell = np.asarray(scene.body.points), np.asarray(scene.body.cells)[int(out.element)]
+    facets, reach = points[np.asarray(scene.probe.patch)].mean(1), float(contact.breadth(scene))
+    here = points[cell].mean(0)
+    if np.linalg.norm(facets - here, axis=1).min() <= NEAR * reach:
+        return True
+    settled = 0.0 if scene.body.settled is None else np.asarray(scene.body.settled)[cell].mean(0)
+    until = np.linspace(0.0, float(out.end_time[int(out.failed)]), STOPS)
+    way = np.stack([np.interp(until, np.asarray(scene.probe.time), x) for x in np.asarray(scene.probe.position).T], 1)
+    return bool(np.linalg.norm(way - here - settled, axis=1).min() <= (1 + NEAR) * reach)
