@@ -211,11 +211,11 @@ def test_a_breakdown_away_from_the_probe_is_put_down_to_gravity_or_the_support()
         run(scene)
 
 
-@pytest.mark.parametrize(("deep", "said"), [(0.009, True), (0.001, False)])
-def test_a_breakdown_below_the_surface_is_the_probes_where_its_tip_has_come_near(deep, said):
+@pytest.mark.parametrize(("deep", "lower", "said"), [(0.009, 0.0, True), (0.001, 0.0, False), (0.001, 0.008, True)])
+def test_a_breakdown_below_the_surface_is_the_probes_where_its_tip_has_come_near(deep, lower, said):
     """A ball of 3 mm on tissue with weight; an element 7.5 mm below the surface, two and a half radii, breaks down.
 
-    Pressed 9 mm the tip has gone past it; pressed 1 mm it has not come within two radii.
+    Pressed 9 mm the tip has gone past it; pressed 1 mm it has not come within two radii, unless it stands 8 mm lower.
     """
     g, radius, top = box((0.02, 0.02, 0.02), (4, 4, 4)), 0.003, 0.02
     path = np.array([[0.0, 0.0, top + radius + 1e-3], [0.0, 0.0, top + radius - deep]])
@@ -223,6 +223,7 @@ def test_a_breakdown_below_the_surface_is_the_probes_where_its_tip_has_come_near
         ReducedPolynomial(order=1), cases.NEO, 15e3, g, times=(np.arange(20) + 0.5) * 0.05, gravity=(0, 0, -9.81),
         probe_path=build.ProbePath(np.array([0.0, 1.0]), path, radius),
     )  # fmt: skip
+    scene = scene.put({"probe.offset": jnp.array([0.0, 0.0, -lower])}) if lower else scene
     centres = np.asarray(g.points)[np.asarray(g.cells)].mean(1)
     below = int(np.linalg.norm(centres - [0.0025, 0.0025, 0.0125], axis=1).argmin())
     out = SimpleNamespace(element=below, failed=1, end_time=np.array([0.5, 1.0]))

@@ -104,8 +104,7 @@ def weight(scene: Scene) -> str:
 
 def _pierced(out, scene, frame) -> str:
     when, deep, reach = float(out.end_time[frame]), float(out.penetration[frame]), float(contact.breadth(scene))
-    path = np.asarray(scene.probe.position)
-    centre = [np.interp(when, np.asarray(scene.probe.time), x) for x in path.T]
+    (centre,) = _way(scene, [when])
     worst, penalty = float(np.max(out.penetration)), float(scene.probe.penalty)
     needed = penalty * worst / (0.01 * reach)
     return (
@@ -129,6 +128,13 @@ def _folded(out, scene, block: int) -> str:
     )
 
 
+def _way(scene: Scene, times) -> np.ndarray:
+    """The probe's centre at these times, (n, 3), m."""
+    time, place = np.asarray(scene.probe.time), np.asarray(scene.probe.position)
+    offset = 0.0 if scene.probe.offset is None else np.asarray(scene.probe.offset)
+    return np.stack([np.interp(times, time, x) for x in place.T], axis=1) + offset
+
+
 def _under_probe(out, scene: Scene) -> bool:
     """Whether the element that broke down lies at the patch, or where the tip came near on its way down."""
     if scene.probe is None:
@@ -139,6 +145,5 @@ def _under_probe(out, scene: Scene) -> bool:
     if np.linalg.norm(facets - here, axis=1).min() <= NEAR * reach:
         return True
     settled = 0.0 if scene.body.settled is None else np.asarray(scene.body.settled)[cell].mean(0)
-    until = np.linspace(0.0, float(out.end_time[int(out.failed)]), STOPS)
-    way = np.stack([np.interp(until, np.asarray(scene.probe.time), x) for x in np.asarray(scene.probe.position).T], 1)
+    way = _way(scene, np.linspace(0.0, float(out.end_time[int(out.failed)]), STOPS))
     return bool(np.linalg.norm(way - here - settled, axis=1).min() <= (1 + NEAR) * reach)
