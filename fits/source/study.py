@@ -7,6 +7,7 @@ draws table and figures of what is there.
 """
 
 import runpy
+from collections.abc import Callable
 from pathlib import Path
 
 import jax
@@ -20,7 +21,9 @@ from tissuejax.storage import write_text
 jax.config.update("jax_enable_x64", True)
 
 STUDIES = source.ROOT.parent / "fits"  # of the checkout: a copy of this folder reads its neighbours there
-COARSE, MIDDLE = (14, 12, 7), (20, 16, 9)
+COARSE, MIDDLE, FINE = (14, 12, 7), (20, 16, 9), (28, 22, 12)
+MESHES = {"coarse": COARSE, "middle": MIDDLE, "fine": FINE}
+SOFTER = (1.0, 3.0)  # hourglass stiffness of the press beside the one it takes, for the ball of 10 mm
 SITE_MESH = (16, 16, 8)
 SAGS = ((20, 16, 8), (24, 20, 10))
 AT_REST = 0.3  # hourglass stiffness for the weight alone, which strains little
@@ -47,8 +50,8 @@ def needed(folder: Path) -> dict[str, tuple[Path, ...]]:
 
 
 def lobe_parts(lobe: dict, kept: Parts, needs: tuple[Path, ...]) -> None:
-    """The settled lobe and the press, on two meshes; the other Ogden forms and reversed gravity on the coarse one."""
-    for name, counts in (("coarse", COARSE), ("middle", MIDDLE)):
+    """The settled lobe and the press, on three meshes; the other Ogden forms and reversed gravity on the coarse one."""
+    for name, counts in MESHES.items():
         shapes = {}
 
         def shape(counts=counts, shapes=shapes):
@@ -56,14 +59,23 @@ def lobe_parts(lobe: dict, kept: Parts, needs: tuple[Path, ...]) -> None:
                 shapes["at"] = lobe["settled"](counts)
             return shapes["at"]
 
+        def pressed(part, r, shape=shape, **options):
+            kept.get(f"pressed, {part}", lambda: answered(lambda: lobe["pressed"](*shape(), r, **options)), needs)
+
         kept.get(f"settled, {name}", lambda shape=shape: lobe["sag"](*shape()), needs)
         for radius, r in RADII.items():
-            kept.get(f"pressed, {name}, {radius}", lambda shape=shape, r=r: lobe["pressed"](*shape(), r), needs)
+            pressed(f"{name}, {radius}", r)
+        for h in SOFTER if name != "coarse" else ():
+            pressed(f"{name}, R 10 mm, hourglass {h:g}", RADII["R 10 mm"], hourglass=h)
     for counts in SAGS:
         name = f"sag, {' x '.join(map(str, counts))}"
         kept.get(name, lambda counts=counts: sagging(lobe, counts), needs)
     for form in lobe["FORMS"][1:]:
-        kept.get(f"settled, coarse, {form}", lambda form=form: settled_or_not(lobe, form), needs)
+        kept.get(
+            f"settled, coarse, {form}",
+            lambda form=form: answered(lambda: lobe["sag"](*lobe["settled"](COARSE, form))),
+            needs,
+        )
     kept.get("gravity reversed and applied again", lambda: lobe["reversed_gravity"](COARSE), needs)
 
 
@@ -94,12 +106,12 @@ def sagging(lobe: dict, counts: tuple[int, int, int]) -> dict:
     return lobe["sag"](geometry, u) | {"hexes": len(geometry.cells)}
 
 
-def settled_or_not(lobe: dict, form: str) -> dict:
-    """Sag in another Ogden form, or the sentence why there is none."""
+def answered(work: Callable[[], dict]) -> dict:
+    """What it gives, or the sentence why there is nothing."""
     from tissuejax.errors import TissueError
 
     try:
-        return lobe["sag"](*lobe["settled"](COARSE, form))
+        return work()
     except TissueError as error:
         return {"no answer": str(error)}
 
@@ -111,9 +123,9 @@ def draw_lobe(kept: Parts) -> Figure:
     x = np.linspace(0, 15.5, 100)
     axes.semilogy(x, PUBLISHED["a_N"] * np.exp(PUBLISHED["b_1_m"] * 1e-3 * x), "k", label="eq. 4.14")
     for i, radius in enumerate(RADII):
-        for name, line in (("coarse", "--"), ("middle", "-")):
+        for name, line in (("coarse", ":"), ("middle", "--"), ("fine", "-")):
             part = kept.parts.get(f"pressed, {name}, {radius}")
-            if part:
+            if part and "force_N" in part:
                 force = np.maximum(part["force_N"], 1e-4)
                 axes.semilogy(part["depth_mm"], force, line, color=f"C{i}", label=f"{radius}, {part['hexes']} hexes")
     axes.set_xlabel("depth (mm)")
@@ -184,7 +196,7 @@ def main(folder: Path) -> str:
         kept.get(name, work, needs["table"])
     lobe_parts(lobe, kept, needs["lobe"])
     for name, part in list(kept.parts.items()):
-        if name.startswith("pressed"):
+        if name.startswith("pressed") and "force_N" in part:
             way = part["depth_mm"], part["force_N"]
             kept.get(f"eq. 4.14, {name}", lambda way=way: lobe["exponential"](*way), needs["lobe"], of=way)
     cylinder_parts(cylinder, kept, needs["cylinder"])

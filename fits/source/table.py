@@ -100,7 +100,7 @@ PARTS = {
 
 def _press(parts: dict, name: str) -> str:
     part, fit = parts.get(f"pressed, {name}"), parts.get(f"eq. 4.14, pressed, {name}")
-    if part is None:
+    if part is None or "no answer" in part:
         return ""
     text = f"{part['force_N'][-1]:.2f} N ({name}, {part['hexes']} hexes)"
     return text + (f", {fit['a_N']:.4f} e^({fit['b_1_m']:.0f} d), R² {fit['r_squared']:.4f}" if fit else "")
@@ -189,7 +189,7 @@ def rows(parts: dict) -> list[Row]:
     t22, fast = parts["table 2.2, averages"], parts["time of a step"]
     sag = [parts[k] for k in parts if k.startswith("sag, ")]
     sag_text = "; ".join(f"{s['hexes']} hexes: {s['mean_mm']:.2f} mm, {s['height_mm']:.2f} mm" for s in sag)
-    presses = [_press(parts, f"{mesh}, {r}") for r in ("R 5 mm", "R 10 mm") for mesh in ("coarse", "middle")]
+    presses = [_press(parts, f"{mesh}, {r}") for r in ("R 5 mm", "R 10 mm") for mesh in ("coarse", "middle", "fine")]
     press = "; ".join(p for p in presses if p)
     reverse = parts.get("gravity reversed and applied again")
     reverse = (
