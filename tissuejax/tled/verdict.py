@@ -8,7 +8,7 @@ import numpy as np
 from tissuejax.arrays import Given
 from tissuejax.errors import CoarseMesh, UnstableSimulation
 from tissuejax.tled import contact
-from tissuejax.tled.scene import Scene
+from tissuejax.tled.scene import Probe, Scene
 from tissuejax.tled.stable import critical_steps
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def weight(scene: Scene) -> str:
 
 def _pierced(out, scene, frame) -> str:
     when, deep, reach = float(out.end_time[frame]), float(out.penetration[frame]), float(contact.breadth(scene))
-    (centre,) = _way(scene, [when])
+    (centre,) = _way(scene.probe, [when])
     worst, penalty = float(np.max(out.penetration)), float(scene.probe.penalty)
     needed = penalty * worst / (0.01 * reach)
     return (
@@ -128,10 +128,10 @@ def _folded(out, scene, block: int) -> str:
     )
 
 
-def _way(scene: Scene, times) -> np.ndarray:
+def _way(probe: Probe, times) -> np.ndarray:
     """The probe's centre at these times, (n, 3), m."""
-    time, place = np.asarray(scene.probe.time), np.asarray(scene.probe.position)
-    offset = 0.0 if scene.probe.offset is None else np.asarray(scene.probe.offset)
+    time, place = np.asarray(probe.time), np.asarray(probe.position)
+    offset = 0.0 if probe.offset is None else np.asarray(probe.offset)
     return np.stack([np.interp(times, time, x) for x in place.T], axis=1) + offset
 
 
@@ -145,5 +145,5 @@ def _under_probe(out, scene: Scene) -> bool:
     if np.linalg.norm(facets - here, axis=1).min() <= NEAR * reach:
         return True
     settled = 0.0 if scene.body.settled is None else np.asarray(scene.body.settled)[cell].mean(0)
-    way = _way(scene, np.linspace(0.0, float(out.end_time[int(out.failed)]), STOPS))
+    way = _way(scene.probe, np.linspace(0.0, float(out.end_time[int(out.failed)]), STOPS))
     return bool(np.linalg.norm(way - here - settled, axis=1).min() <= (1 + NEAR) * reach)
