@@ -8,7 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from tissuejax.energies.neo_hookean import NeoHookean
+from tissuejax.energies.volumetric import Quadratic
+from tissuejax.mesh.columns import box
+from tissuejax.tled import build
 from tissuejax.tled.lanes import library, loop, share
+from tissuejax.tled.simulate import COMPILER_OPTIONS, simulate
 
 pytestmark = pytest.mark.skipif(library.compiler() is None, reason="no C compiler here")
 NODES = 5000
@@ -79,3 +84,12 @@ def test_on_two_threads_each_bit_is_that_of_one(monkeypatch):
     assert all(one == alone for one in both)
     if len(os.sched_getaffinity(0)) > 1:
         assert helped >= 1
+
+
+@pytest.mark.parametrize(("options", "shared"), [(COMPILER_OPTIONS, False), ({}, True)], ids=["ours", "XLA's own"])
+def test_sums_over_the_nodes_are_not_shared(options, shared):
+    """XLA's parts of an operation, which a step of some 9,000 nodes waits for longer than they save."""
+    material = build.Tissue(NeoHookean(), Quadratic(), dict(mu=1e3), dict(K=2e4), 1e3)
+    scene = build.scene(box((0.1, 0.1, 0.1), (20, 20, 20)), material, np.arange(3) / 60).cast(jnp.float32)
+    program = jax.jit(simulate, compiler_options=options).lower(scene).compile()
+    assert ("outer_dimension_partitions" in program.as_text()) == shared or len(os.sched_getaffinity(0)) == 1

@@ -47,8 +47,8 @@ shown come from a fit to the others, with nothing fitted to those held out.
 
 What is written into --out: result.json (every number), report.html (one page to read and keep), remainder.json (what is
 still left, as smooth functions of drive, rate, time and place), evidence.json (every set weighed), the figures (PNG;
-SVG and PDF in print/), curves.csv (the first figure in numbers, SI) and parameters.tex. Probings take minutes; one that
-was stopped goes on where it was when the same command is given again. Material tests and cuts begin anew.
+SVG and PDF in print/), curves.csv (the first figure in numbers, SI) and parameters.tex. Probings take minutes; what was
+stopped goes on where it was when the same command is given again.
 """
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
