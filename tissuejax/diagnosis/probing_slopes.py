@@ -21,13 +21,14 @@ class Slope:
     """One column: where it was taken, the prediction there, and for which recordings.
 
     Attributes:
-        values: all values; `prediction` at these, long vector, SI.
+        values: all values.
+        calmed: the prediction at these, without what rings (`ProbingBench.calmed`), long vector, SI.
         recordings: whose rows mean anything.
         column: derivative by the parameter, SI.
     """
 
     values: Mapping[str, float]
-    prediction: Float[np.ndarray, " N"]
+    calmed: Float[np.ndarray, " N"]
     recordings: frozenset[str]
     column: Float[np.ndarray, " N"]
 
@@ -56,14 +57,14 @@ class Slopes:
         """The column taken nearest to `values`, if one is near enough.
 
         Args:
-            change: of a prediction, its relative difference from that at `values`.
+            change: of a prediction, calmed, its relative difference from that at `values`.
             reach: largest such difference.
             shape: see `Simulated.shape`.
         """
         near = []
         for slope in self.taken.get(path, ()):
             if slope.recordings.issuperset(recordings) and _alike(path, values, slope.values, free, shape):
-                near.append((change(slope.prediction), slope))
+                near.append((change(slope.calmed), slope))
         if not near or min(near, key=lambda n: n[0])[0] > reach:
             return None
         slope = min(near, key=lambda n: n[0])[1]

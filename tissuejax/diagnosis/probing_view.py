@@ -26,7 +26,7 @@ Richardson 1911, Phil. Trans. R. Soc. A 210.
 
 import copy
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -40,6 +40,15 @@ from tissuejax.diagnosis.probing_added import added, is_added
 from tissuejax.diagnosis.probing_runs import COARSE, FINE, RETIMED
 from tissuejax.diagnosis.probing_slopes import Slope
 from tissuejax.experiments.probing_sensors import FEWEST
+
+
+class Here(NamedTuple):
+    """Where columns are wanted: all values, for which recordings, and the coarse prediction there, also calmed."""
+
+    values: Mapping[str, float]
+    wanted: tuple[str, ...]
+    run: Float[np.ndarray, " N"]
+    calmed: Float[np.ndarray, " N"]
 
 
 class ProbingView(Bench):
@@ -119,7 +128,7 @@ class ProbingView(Bench):
         at = self.source.at({p: v for p, v in values.items() if p in self.free})
         if self.place is not None:
             coarse_run = self.source.runs.many([(at, names, COARSE)])[0]
-            if self._change(coarse_run, self.place, names) < self.stays:
+            if self._change(coarse_run, self.source.calmed(self.place - coarse_run), names) < self.stays:
                 return self
         fine, slow, coarse = self.source.runs.many([(at, names, k) for k in (FINE, RETIMED, COARSE)])
         made = copy.copy(self)
@@ -211,12 +220,13 @@ class ProbingView(Bench):
         wanted = tuple(recordings or (*self.fitted, *self.held_out))
         at = {**{p: self.source.start[p] for p in paths}, **self.source.at(values)}
         free = {p for p in paths if is_added(self.source.runs, p)}  # exact, and as cheap as a look
-        columns = {p: None if p in free else self._nearby(p, at, wanted, self.reach) for p in paths}
+        here = None if free.issuperset(paths) else self._here([at], wanted)[0]
+        columns = {p: self._nearby(p, here) if here and p not in free else None for p in paths}
         missing = [p for p, c in columns.items() if c is None]
         if missing:
             made = self.source.jacobian(values, missing, wanted)
             for p, column in zip(missing, made.T, strict=True):
-                columns[p] = column if p in free else self._kept(p, at, wanted, column)
+                columns[p] = self._kept(p, here, column) if here and p not in free else column
         return np.stack([columns[p] for p in paths], axis=1) / self.unit[:, None]
 
     def columns(
@@ -227,41 +237,41 @@ class ProbingView(Bench):
         asked = [({**base, p: self.source.start[p], **s}, p) for s, p in settings]
         asked = [({**at, p: base.get(p, self.source.start[p])}, p) for at, p in asked]
         free = [is_added(self.source.runs, p) for _, p in asked]
-        columns = [
-            None if alone else self._nearby(p, at, self.fitted, self.reach)
-            for (at, p), alone in zip(asked, free, strict=True)
-        ]
+        found = iter(self._here([at for (at, _), alone in zip(asked, free, strict=True) if not alone], self.fitted))
+        here = [None if alone else next(found) for alone in free]
+        columns = [self._nearby(p, h) if h else None for (_, p), h in zip(asked, here, strict=True)]
         missing = [i for i, c in enumerate(columns) if c is None]
         if missing:
             made = self.source.columns(base, [settings[i] for i in missing])
             for i, column in zip(missing, made.T, strict=True):
-                columns[i] = column if free[i] else self._kept(asked[i][1], asked[i][0], self.fitted, column)
+                h = here[i]
+                columns[i] = self._kept(asked[i][1], h, column) if h else column
         return np.stack(columns, axis=1) / self.unit[:, None]
 
-    def _nearby(self, path, at, wanted, reach) -> Float[np.ndarray, " N"] | None:
-        if path not in self.source.slopes_taken.taken:
-            return None
-        coarse_run = self.source.runs.many([(at, wanted, COARSE)])[0]
+    def _here(self, places: Sequence[Mapping[str, float]], wanted: Sequence[str]) -> list[Here]:
+        runs = self.source.runs.many([(at, tuple(wanted), COARSE) for at in places])
+        return [Here(at, tuple(wanted), run, self.source.calmed(run)) for at, run in zip(places, runs, strict=True)]
 
+    def _nearby(self, path: str, here: Here) -> Float[np.ndarray, " N"] | None:
         def change(other: Float[np.ndarray, " N"]) -> float:
-            return self._change(coarse_run, other, wanted)
+            return self._change(here.run, other - here.calmed, here.wanted)
 
-        return self.source.slopes_taken.find(path, at, self.free, wanted, change, reach, self.numbers.shape)
+        taken, shape = self.source.slopes_taken, self.numbers.shape
+        return taken.find(path, here.values, self.free, here.wanted, change, self.reach, shape)
 
-    def _kept(self, path, at, wanted, column) -> Float[np.ndarray, " N"]:
-        coarse_run = self.source.runs.many([(at, wanted, COARSE)])[0]
-        self.source.slopes_taken.keep(path, Slope(dict(at), coarse_run, frozenset(wanted), column))
+    def _kept(self, path: str, here: Here, column: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+        self.source.slopes_taken.keep(path, Slope(here.values, here.calmed, frozenset(here.wanted), column))
         return column
 
-    def _change(self, one, other, recordings) -> float:
-        """Relative difference of two predictions, of the channel where it is largest: markers feel no stiffness."""
+    def _change(self, run: Float[np.ndarray, " N"], moved: Float[np.ndarray, " N"], recordings: Sequence[str]) -> float:
+        """How far a prediction has `moved`, calmed, over how far it is from the origin, of the channel where that is
+        largest: markers feel no stiffness."""
         out = 0.0
         for channel in dict.fromkeys(s.channel for s in self.segments):
             own = [np.r_[s.rows] for s in self.segments if s.channel == channel and s.recording in recordings]
             rows = np.concatenate(own) if own else np.zeros(0, int)
-            size = float(np.linalg.norm((one - self.origin)[rows] / self.unit[rows]))
-            moved = float(np.linalg.norm((self.source.calmed(other - one) / self.unit)[rows]))
-            out = max(out, moved / max(size, 1e-300))
+            size = float(np.linalg.norm((run - self.origin)[rows] / self.unit[rows]))
+            out = max(out, float(np.linalg.norm(moved[rows] / self.unit[rows])) / max(size, 1e-300))
         return out
 
     @property

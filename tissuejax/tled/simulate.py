@@ -31,8 +31,8 @@ from tissuejax.tled.scene import Scene, filled
 from tissuejax.tled.step import Drive, Felt, Machine, State, advance, machine, start, summed
 
 COMPILER_OPTIONS = {
-    # The first keeps the stages apart, see `internal.py`. The second would share the nodes among threads: from some 5,000
-    # on, to wake them takes a third of a step. The element loop is shared by `lanes/share.py`.
+    # The first keeps the stages apart, see `internal.py`. The second would share the nodes among threads: to wake them
+    # takes a third of a step from some 5,000 nodes on. The element loop is shared by `lanes/share.py`.
     "xla_disable_hlo_passes": "cse_barrier_expander,cpu-parallel-task-assigner",
     "xla_cpu_experimental_ynn_fusion_type": "",  # no library sums: each costs 0.15 ms, half of a reverse pass
 }
