@@ -1,4 +1,4 @@
-"""Which numbers of the judgement matter on real recordings? Each halved and doubled, on every fourth sample.
+"""Which numbers of the judgement matter on real recordings? Each halved and doubled, on some of them.
 
 tissuejax/diagnosis/judgement/numbers.py lists the numbers by path. What sets are weighed by is changed beside the sets
 that a search with the usual numbers had found, each from where it came to rest; what decides which sets are tried, or
@@ -12,8 +12,9 @@ python fits/real-panel/matters.py criteria.rig effort.hopeful each halved and do
 python fits/real-panel/matters.py all                         each number halved and doubled
 python fits/real-panel/matters.py table                       matters.csv, matters.png and the table in README.md again
 
-MATTERS_PART=0/2 shares the samples between two processes; `table` is asked when both are done. MATTERS_EVERY=40 asks
-every fortieth sample: a trial of the command, and no result.
+MATTERS_PART=0/2 shares the samples between two processes; `table` is asked when both are done. MATTERS_EVERY=12 asks
+every twelfth sample. A table keeps what matters.csv has of other runs about as many samples, each row with the hash of
+its code.
 """
 
 import csv
@@ -33,6 +34,7 @@ import panel_samples  # noqa: E402
 from study import file_of  # noqa: E402
 
 import tissuejax as tj  # noqa: E402
+from tissuejax.cache.source import LOADED  # noqa: E402
 from tissuejax.challenge.panel import Answer, answered, read_causes  # noqa: E402
 from tissuejax.diagnosis.diagnose import asked_of  # noqa: E402
 from tissuejax.diagnosis.judgement import rejudge  # noqa: E402
@@ -67,7 +69,7 @@ def under(path: str, heads: Sequence[str]) -> bool:
 
 
 def samples() -> list[panel_samples.Entry]:
-    """Every fourth sample in the order of causes.toml, whatever was said of it."""
+    """Every `EVERY`th sample in the order of causes.toml, whatever was said of it."""
     return panel_samples.entries(tomllib.loads((HERE / "causes.toml").read_text()))[::EVERY]
 
 
@@ -169,6 +171,7 @@ def row(path: str, factor: float, way: str, usual: dict[str, Answer]) -> dict | 
         "of": len(caused),
         "nulls": len(nulls),
         "which": "; ".join(differs),
+        "code": LOADED[:10],
     }
 
 
@@ -177,11 +180,13 @@ def table() -> str:
     usual = {way: {a.cause.id: a for a in marked(USUAL, 1.0, way)} for way in ("searched", "weighed")}
     if len(usual["weighed"]) < len(samples()):
         raise InputError("not all samples were asked with the usual numbers: matters.py found, then any number")
-    rows = [row(USUAL, 1.0, way, usual[way]) for way in usual]
+    base = [row(USUAL, 1.0, way, usual[way]) for way in usual]
+    rows = [r for r in base if r is not None]
+    before = asked_before(rows[0])
     for path in numbers():
         way = way_of(path)
-        rows += [row(path, factor, way, usual[way]) for factor in FACTORS]
-    rows = [r for r in rows if r is not None]
+        asked = [row(path, factor, way, usual[way]) or before.get((path, factor)) for factor in FACTORS]
+        rows += [r for r in asked if r is not None]
     text = io.StringIO()
     lines = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
     lines.writeheader()
@@ -201,6 +206,19 @@ def table() -> str:
     body = "\n".join([f"Counts {of}.", "", head, "|---" * 7 + "|", *shown, "", said])
     write_between(HERE / "README.md", BEGIN, END, body)
     return said
+
+
+def asked_before(usual: dict) -> dict[tuple[str, float], dict]:
+    """What matters.csv has of other runs about as many samples: hours of work that one machine need not do at once."""
+    path = HERE / "matters.csv"
+    if not path.exists():
+        return {}
+    counts, found = ("of", "nulls", *COLUMNS), {}
+    for line in csv.DictReader(path.open()):
+        known: dict = {**line, "factor": float(line["factor"]), **{k: int(line[k]) for k in counts}}
+        if line["number"] != USUAL and all(known[k] == usual[k] for k in ("of", "nulls")):
+            found[line["number"], known["factor"]] = known
+    return found
 
 
 def questions(given: Sequence[str]) -> Iterator[tuple[str, float]]:
