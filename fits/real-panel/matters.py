@@ -13,7 +13,7 @@ python fits/real-panel/matters.py all                         each number halved
 python fits/real-panel/matters.py table                       matters.csv, matters.png and the table in README.md again
 
 MATTERS_PART=0/2 shares the samples between two processes; `table` is asked when both are done. MATTERS_EVERY=12 asks
-every twelfth sample. A table keeps what matters.csv has of other runs about as many samples, each row with the hash of
+every twelfth sample. A table keeps what matters.csv has of other runs about the same samples, each row with the hash of
 its code.
 """
 
@@ -171,6 +171,7 @@ def row(path: str, factor: float, way: str, usual: dict[str, Answer]) -> dict | 
         "of": len(caused),
         "nulls": len(nulls),
         "which": "; ".join(differs),
+        "every": EVERY,
         "code": LOADED[:10],
     }
 
@@ -182,7 +183,7 @@ def table() -> str:
         raise InputError("not all samples were asked with the usual numbers: matters.py found, then any number")
     base = [row(USUAL, 1.0, way, usual[way]) for way in usual]
     rows = [r for r in base if r is not None]
-    before = asked_before(rows[0])
+    before = asked_before()
     for path in numbers():
         way = way_of(path)
         asked = [row(path, factor, way, usual[way]) or before.get((path, factor)) for factor in FACTORS]
@@ -202,21 +203,22 @@ def table() -> str:
     ]
     still = [r["number"] for r in rows[2:] if not r[COLUMNS[0]]]
     quiet = sorted(p for p in set(still) if still.count(p) == len(FACTORS))
-    said = f"Of {len(rows[2:])} changes {len(still)} change no answer. Neither does of: {', '.join(quiet)}."
+    codes = sorted({r["code"] for r in rows})
+    by = f"Code by its hash: {', '.join(codes)}."
+    said = f"{by} Of {len(rows[2:])} changes {len(still)} change no answer. Neither does of: {', '.join(quiet)}."
     body = "\n".join([f"Counts {of}.", "", head, "|---" * 7 + "|", *shown, "", said])
     write_between(HERE / "README.md", BEGIN, END, body)
     return said
 
 
-def asked_before(usual: dict) -> dict[tuple[str, float], dict]:
-    """What matters.csv has of other runs about as many samples: hours of work that one machine need not do at once."""
+def asked_before() -> dict[tuple[str, float], dict]:
+    """What matters.csv has of other runs about the same samples: hours that one machine need not spend at once."""
     path = HERE / "matters.csv"
-    if not path.exists():
-        return {}
-    counts, found = ("of", "nulls", *COLUMNS), {}
-    for line in csv.DictReader(path.open()):
-        known: dict = {**line, "factor": float(line["factor"]), **{k: int(line[k]) for k in counts}}
-        if line["number"] != USUAL and all(known[k] == usual[k] for k in ("of", "nulls")):
+    lines = list(csv.DictReader(path.open())) if path.exists() else []
+    found = {}
+    for line in lines:
+        known: dict = {**line, "factor": float(line["factor"]), **{k: int(line[k]) for k in COLUMNS}}
+        if line["every"] == str(EVERY):
             found[line["number"], known["factor"]] = known
     return found
 
