@@ -1,5 +1,7 @@
 """Histories against independent numpy: fine quadrature of the convolution, a stiff ODE solver, damage by a loop."""
 
+from itertools import pairwise
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -130,6 +132,29 @@ def test_nonlinear_viscosity_against_a_stiff_solver():
     found = predicted(effect("nonlinear-viscosity"), values, time)
     expected = reported(l, S11 - g * exact[0], S33 - g * exact[1])
     np.testing.assert_allclose(found, expected, atol=5e-4 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(("tau", "m"), [(3.0, 3.0), (0.3, 6.0)])
+def test_nonlinear_viscosity_takes_the_corners_of_its_load(tau, m):
+    """Stress linear between samples, which turns at each: integrated from one to the next by another solver."""
+    g, stress = 0.4, 150.0
+    time = np.linspace(0, 15, 151)
+    l = drive(time)
+    S11, S33, *_ = elastic(l)
+    S = np.stack([S11, S33], 1)
+    flowed = [S[0]]
+    for k, (a, b) in enumerate(pairwise(time)):
+
+        def flow(t, z, k=k, a=a, b=b):
+            load = S[k] + (S[k + 1] - S[k]) * (t - a) / (b - a) - z
+            return load / tau * (1 + (load[0] ** 2 + 2 * load[1] ** 2) / stress**2) ** ((m - 1) / 2)
+
+        flowed.append(solve_ivp(flow, (a, b), flowed[-1], "DOP853", rtol=1e-11, atol=1e-9).y[:, -1])
+    z11, z33 = np.transpose(flowed)
+    values = {f"effects.nonlinear-viscosity.{k}": v for k, v in dict(g=g, tau=tau, stress=stress, exponent=m).items()}
+    found = predicted(effect("nonlinear-viscosity"), values, time)
+    expected = reported(l, S11 - g * z11, S33 - g * z33)
+    np.testing.assert_allclose(found, expected, atol=2e-9 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("law", ["erf", "tanh"])

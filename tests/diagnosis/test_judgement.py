@@ -348,3 +348,30 @@ def test_what_specimens_share_does_not_carry_how_they_differ():
             np.testing.assert_allclose(p.factor[:20], p.factor[20:], rtol=1e-9, atol=1e-12)
     own = next(p for p in parts if p.family == "gain")
     assert not np.any(own.factor[:20] * own.factor[20:])
+
+
+PRONY = tuple(f"effects.viscoelasticity.{p}" for p in ("g1", "tau1", "g2", "tau2", "g3", "tau3"))
+LOAD = tuple(f"effects.nonlinear-viscosity.{p}" for p in ("g", "tau", "stress", "exponent"))
+
+
+@pytest.mark.parametrize(
+    ("two_times", "by_load", "shown"),
+    [
+        (-1.0, -10.0, "series/2"),  # inside the likeliest and nearly as likely: its two further constants have no error
+        (-4.0, -10.0, "series/3"),  # beaten 55 to 1
+        (-1.0, -0.5, "series/2"),  # another law is no plainer for having fewer constants
+        (-4.0, -0.5, "series/3"),
+        (-1.0, 0.5, "load"),  # the likeliest, and nothing is inside it
+    ],
+)
+def test_a_form_inside_the_likeliest_is_shown_where_that_does_not_beat_it(two_times, by_load, shown):
+    forms = {"series/3": (0.0, PRONY), "series/2": (two_times, PRONY[:4]), "load": (by_load, LOAD)}
+    sets = [
+        dataclasses.replace(
+            weighed(["relaxation"], 50.0 + more, chi2=100.0), keys=(form,), free=("energy.mu", *free), k=1 + len(free)
+        )
+        for form, (more, free) in forms.items()
+    ]
+    j = judge(evidence(weighed([], 0.0, chi2=100.0), *sets), Criteria(strong=20.0))  # noise is left: all of it counts
+    assert j.chosen.keys == (shown,)
+    assert j.names == ("relaxation",)

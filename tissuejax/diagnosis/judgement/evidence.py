@@ -33,6 +33,7 @@ class SetEvidence:
         explained: share of the base's misfit (beyond noise) that the set's model alone removes.
         rest: mean square of the discrepancy left, as a share of the squared peak, and its standard deviation.
         numerical: root mean square of what is laid to mesh and step of a simulation, a share of the peak.
+        free: paths of the free parameters; none in files of before they were kept.
     """
 
     keys: tuple[str, ...]
@@ -51,6 +52,7 @@ class SetEvidence:
     explained: float
     rest: tuple[float, float]
     numerical: float = 0.0
+    free: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,10 @@ def read_evidence(path: Path) -> Evidence:
     """
     try:
         given = json.loads(Path(path).read_text())
-        tuples, left_out = {"keys", "names", "at_bound", "rest"}, {"held"}  # what was written once, and never filled
+        tuples, left_out = (
+            {"keys", "names", "at_bound", "rest", "free"},
+            {"held"},
+        )  # what was written once, and never filled
         sets = [
             SetEvidence(**{k: tuple(v) if k in tuples else v for k, v in s.items() if k not in left_out})
             for s in given["sets"]

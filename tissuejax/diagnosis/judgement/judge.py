@@ -206,12 +206,14 @@ def _chosen(kind, stated, named, p, best, empty) -> SetEvidence:
 
 
 def _plainest(forms: Sequence[tuple[float, SetEvidence]], strong: float) -> SetEvidence:
-    """The form of a set that is shown, of (weight, form): the one with fewest parameters that none beats strongly.
+    """The form of a set that is shown, of (weight, form): the likeliest, or one inside it that it hardly beats.
 
-    What is named does not depend on it. A third relaxation time that is no more than likely has no error to show.
+    What is named does not depend on it. A third relaxation time that is no more than likely has no error to show; a
+    form of other parameters is another law, and fewer of them make it no plainer.
     """
-    top = max(w for w, _ in forms)
-    return min((s.k, -w, i, s) for i, (w, s) in enumerate(forms) if w > top - math.log(strong))[-1]
+    top, likeliest = max(forms, key=lambda form: form[0])
+    inside = [(w, s) for w, s in forms if w > top - math.log(strong) and set(s.free) < set(likeliest.free)]
+    return min((len(s.free), -w, i, s) for i, (w, s) in enumerate([(top, likeliest), *inside]))[-1]
 
 
 def covering(judgement: Judgement, criteria: Criteria | None = None) -> tuple[tuple[SetEvidence, float], ...]:

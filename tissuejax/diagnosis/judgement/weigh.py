@@ -300,6 +300,7 @@ def _described(scales: Scales, keys: Sequence[str], best: Round, criteria: Crite
         explained=float(np.clip(1 - max(chi2 - n, 0.0) / base, -1.0, 1.0)),
         rest=(float(np.mean(left**2 + open_still)) + spiky, wobble(left, open_still, criteria.alike)),
         numerical=numerical(scales, parts, v),
+        free=tuple(fit.values),
     )
     size = scales.peak if scales.size is None else scales.size
     return Weighed(evidence, fit, v, parts, left * size, bench, linear=best.linear)
