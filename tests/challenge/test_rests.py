@@ -183,6 +183,14 @@ def test_size_of_the_rest_and_what_was_tried():
     assert m.rest_over_true == pytest.approx(1.5)
     assert m.tried is True
     assert mark_rest("s", key(("slack",)), said("unexplained", sets=[{"effects": ["drift/linear"]}])).tried is False
+    assert mark_rest("s", key(("slack",)), said("unexplained"), kept=8.0).kept_ratio == pytest.approx(2.0)
+
+
+def test_probings_keep_no_recording_back_and_are_graded():
+    told = json.loads(json.dumps(key(("slack",)) | {"kept_rms": {"rest": None}}))
+    m = mark_rest("p", told, said("found", "slack"))
+    assert m.right is True
+    assert np.isnan(m.kept_ratio)
 
 
 def test_the_seed_belongs_to_the_commit_and_to_the_kind(tmp_path):

@@ -80,6 +80,6 @@ def beside(
             "recordings": most_of(gap["recordings"]),
             "phases": most_of(gap["phases"]),
         },
-        "kept_rms": {"rest": float("nan")},  # a fourth press would cost as much again: none is kept back
+        "kept_rms": {"rest": None},  # a fourth press would cost as much again: none is kept back
     }
     return Beside(presses, key)

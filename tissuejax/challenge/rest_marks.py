@@ -31,7 +31,8 @@ class RestMark:
         where: (right, false, missed) places, recordings and phases together.
         channels: the same of a probing's channels; None where the key names none.
         confidence: as stated, or nan.
-        kept_ratio: rms error on the recording that nothing read over the rms of the true rest there; nan if unknown.
+        kept_ratio: rms error on the recording that nothing read over the rms of the true rest there; nan if unknown,
+            or where a case keeps none back (probings).
         seconds: wall time.
     """
 
@@ -85,7 +86,7 @@ def mark_rest(name: str, key: dict, result: dict, seconds: float = math.nan, kep
     wrong = tuple(n for n in named if n not in allowed)
     recordings, phases = stated(result.get("located") or ())
     a, b = agreement(key["where"]["recordings"], recordings), agreement(key["where"]["phases"], phases)
-    confidence = result.get("confidence")
+    confidence, there = result.get("confidence"), key["kept_rms"]["rest"]
     offered = set(named) | set(names_in(result.get("alternatives"))) | set(best)
     if verdict == "ambiguous":
         apt = bool(truth) and set(truth) <= offered
@@ -111,6 +112,6 @@ def mark_rest(name: str, key: dict, result: dict, seconds: float = math.nan, kep
         where=(a[0] + b[0], a[1] + b[1], a[2] + b[2]),
         channels=channels_found(key, result),
         confidence=float(confidence) if isinstance(confidence, int | float) else math.nan,
-        kept_ratio=kept / key["kept_rms"]["rest"],
+        kept_ratio=math.nan if there is None else kept / there,
         seconds=seconds,
     )

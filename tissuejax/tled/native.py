@@ -3,7 +3,7 @@ elsewhere what XLA makes of them stands.
 
 TISSUEJAX_NATIVE=off leaves all to XLA: the same to rounding. XLA copies between its stages, and each of some 55
 operations a block costs a call: the step takes 2.8 to 4.6 times what a hand-written one does (tests/bench/yardstick.c,
-a core with AVX-512). The same traced formula, written out as C, takes 1.6 to 1.9 times as much, and a probing's fit
+a core with AVX-512). The same traced formula, written out as C, takes 1.1 to 1.5 times as much, and a probing's fit
 (p01) 0.64 of the CPU time with everything compiled anew, 0.52 with programs kept. Energies are still written once, as
 energies: the C is made from what JAX traced of the element, derivatives included; an operation that has no form in C
 leaves its loop to XLA. Long loops are shared by two threads, to the same bits as on one (`lanes/share.py`).

@@ -166,12 +166,10 @@ def advance(m: Machine, state: State, drive: Drive) -> tuple[State, Felt]:
         moving = spurred(scene, m.glide, f, filled(state.slip.elastic), filled(m.hold.area), m.mass)
     driven = (1.0 - half) * v + h * moving / m.mass
     driven = driven if drive.pace is None else driven + 2.0 * half * drive.pace[:, None]
-    pushed = driven / (1.0 + half)
     slip = support.slide(scene, m.hold, state.slip, f, moving, m.mass) if support.slips(scene) else state.slip
-    moved = u + h * pushed
-    moved = jnp.where(m.hold.held, support.target(scene, m.hold, slip, drive.motion), moved)
-    pushed = jnp.where(m.hold.held, (moved - u) / h, pushed)
-    moved, pushed = barrier((moved, pushed))
+    told = (support.target(scene, m.hold, slip, drive.motion) - u) / h
+    pushed = barrier(jnp.where(m.hold.held, told, driven / (1.0 + half)))  # once, not again for where it leads
+    moved = barrier(u + h * pushed)
     reaction = jnp.sum(scene.body.held.T * f[:, scene.body.fixed], axis=1)  # force of the tissue on the support
     spent = None if scene.faces is None else _spent(m, filled(acting), inner, f, v, pushed, drive.pace)
     return State(moved, pushed, history, grip, slip, felt, opening), Felt(force, torque, reaction, work, spent)
