@@ -70,7 +70,8 @@ def main(folder: Path) -> None:
     """Print a row a setting."""
     keys = json.loads((folder / "sealed" / "keys.json").read_text())
     keys, cases = keys.get("cases", keys), stored(folder)
-    rest = json.loads((folder / "manifest.json").read_text())["kind"] == "rest"
+    made = json.loads((folder / "manifest.json").read_text())
+    rest = made["kind"] == "rest" or bool(made.get("rest"))
     for label, criteria in settings(any(evidence.simulated for evidence, _ in cases.values())):
         print(f"{label:34s} {row(cases, keys, criteria, rest)}")
 

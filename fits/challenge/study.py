@@ -32,6 +32,7 @@ NEWEST = {
     "material tests": ("material-thirteenth", "material-fourteenth"),
     "beside a rest": ("rest-seventh",),
     "probings": ("probing-seventh",),
+    "probings beside a rest": ("probing-rest",),
 }  # the newest of each kind, of the judgements of their day
 
 

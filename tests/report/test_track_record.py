@@ -8,7 +8,7 @@ import pytest
 from tissuejax.report.track_record import RECORD, sentence
 
 POOLED = Path(__file__).parents[2] / "fits" / "challenge" / "pooled.json"
-SETS = {"homogeneous": ("material tests", "beside a rest"), "probing": ("probings",)}
+SETS = {"homogeneous": ("material tests", "beside a rest"), "probing": ("probings", "probings beside a rest")}
 
 
 @pytest.mark.parametrize("experiment", RECORD)
@@ -31,4 +31,4 @@ def test_the_record_is_that_of_the_graded_sets(experiment):
 def test_too_few_answers_say_nothing():
     assert sentence("probing", "found-in-part") == ""
     assert sentence("cutting", "found") == ""
-    assert "11 of 12 answers of this kind were true" in sentence("probing", "found")
+    assert "14 of 16 answers of this kind were true" in sentence("probing", "found")
