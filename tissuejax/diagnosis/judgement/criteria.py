@@ -75,7 +75,7 @@ class Criteria:
             of Barbieri and Berger 2004).
         covered: share of the probability of named sets that the alternatives offered add up to. Ground:
             nine of ten, as an interval is usually given.
-        strong: odds from which a form with more parameters is shown in place of a plainer one. Ground: "strong" in the
+        strong: odds from which a form is shown in place of a plainer one inside it. Ground: "strong" in the
             scale of Kass and Raftery (J. Am. Stat. Assoc. 90, 1995).
         twins: relative difference up to which two relaxation times are one. Ground: no recording tells two so near from
             one.
