@@ -4,7 +4,9 @@
 
 Writes `results/gpu.json` with the card's name: wall nanoseconds an element and step of 88,000 and of 1,000,000 hexes,
 and the simulations that 256 diagnoses of one probing would ask for at once: 256 runs with constants of their own, and
-256 Jacobians to five constants, over one of each. A diagnosis itself is a search that the host drives, one question
+256 Jacobians to five constants, over one of each. A ball pressed into a block, in double precision, says whether
+both compute the same: the largest difference of its force and of the force's derivative, over their largest value.
+A diagnosis itself is a search that the host drives, one question
 after the other: it has no form as one batch. The processor's figures come from the same run, by a process of its own:
 where a compiler is, the compiled loop on one core. Nothing in the project depends on a card.
 """
@@ -30,7 +32,7 @@ from tissuejax.energies.volumetric import Quadratic
 from tissuejax.mesh.columns import box
 from tissuejax.storage import write_json
 from tissuejax.tled import build
-from tissuejax.tled.simulate import COMPILER_OPTIONS, compiled
+from tissuejax.tled.simulate import COMPILER_OPTIONS, compiled, simulate
 
 BODIES = {"88,000 hexes": (40, 44, 50), "1,000,000 hexes": (100, 100, 100)}
 STEPS = {"88,000 hexes": 50, "1,000,000 hexes": 10}  # a frame, of 20 frames; a fifth of them on the processor
@@ -88,6 +90,33 @@ def batch(count: int) -> dict[str, float]:
     }
 
 
+def pressed() -> dict[str, list[float]]:
+    """Force on a ball that is pressed into a block, N, frame by frame, and its derivative by C10, N/Pa."""
+    t = np.linspace(0, 1, 101)
+    way = np.stack([0 * t, 0 * t, 0.0448 - 0.008 * t], 1)
+    scene = build.scene(
+        box((0.18, 0.115, 0.04), (14, 10, 5)),
+        build.Tissue(ReducedPolynomial(order=2), Quadratic(), dict(C10=780.0, C20=300.0), dict(K=20e3), 1060.0),
+        np.arange(6) / 6,
+        build.ProbePath(t, way, 0.00475),
+    )
+
+    def force(stiffness):
+        values = {"C10": stiffness, "C20": jnp.asarray(300.0)}
+        return simulate(scene.put({"tissue.energy_values": values})).force[:, 2]
+
+    both = jax.jit(lambda c: jax.jvp(force, (c,), (jnp.ones(()),)), compiler_options=COMPILER_OPTIONS)
+    return dict(zip(("force", "derivative"), (x.tolist() for x in both(jnp.asarray(780.0))), strict=True))
+
+
+def apart(card: dict, processor: dict) -> dict[str, float]:
+    """Largest difference of each series, over its largest value."""
+    return {
+        name: float(np.max(np.abs(np.subtract(card[name], series))) / np.max(np.abs(series)))
+        for name, series in processor.items()
+    }
+
+
 def figures() -> dict:
     """All of it on the device that JAX has; what fails says why."""
     found: dict = {"device": str(jax.devices()[0].device_kind)}
@@ -99,6 +128,7 @@ def figures() -> dict:
     counts = (1, BATCH) if jax.default_backend() != "cpu" else (1, 4)
     jobs |= {f"{n} of 1,000 hexes and 500 steps, s": lambda n=n: {k: round(s, 3) for k, s in batch(n).items()}
              for n in counts}  # fmt: skip
+    jobs["pressed block"] = pressed
     for name, job in jobs.items():
         try:
             found[name] = job()
@@ -124,6 +154,8 @@ def main() -> None:
     for name, job in (("card", figures), ("processor", host)):
         told[name] = job()
         write_json(target, told)  # what was measured stays, should a later part be stopped
+    told["apart"] = apart(told["card"].pop("pressed block"), told["processor"].pop("pressed block"))
+    write_json(target, told)
     print(target.read_text())
 
 
