@@ -75,7 +75,15 @@ def test_a_noise_level_a_little_low_is_not_something_missing():
     assert not beyond_noise(little)
     assert "of no note" in sentences.overall(little)
     assert any("is the noise level right?" in w for w in little.warnings)
-    worse = tj.fit(sample(60.0, stated=25.0), "neo-hookean", search=ONCE)
+    scatter = tj.fit(sample(60.0, stated=25.0), "neo-hookean", search=ONCE)  # of 60 independent samples
+    assert not beyond_noise(scatter)
+    assert "check the noise level" in sentences.overall(scatter)
+    assert any("what is left scatters" in w for w in scatter.warnings)
+    assert not any("lack" in step for step in sentences.next_steps(scatter))
+    worse = sample(25.0)
+    channel = worse.recordings["pull"].channels["nominal_stress"]
+    channel.values[:] += 80 * np.sin(np.arange(60.0) / 4)  # as much again, and no scatter
+    worse = tj.fit(worse, "neo-hookean", search=ONCE)
     assert "something is missing" in sentences.overall(worse)
     assert any("lacks" in step for step in sentences.next_steps(worse))
     assert any("exceeds the noise" in w for w in worse.warnings)

@@ -58,7 +58,18 @@ def held_out(chi2):
         ),
         (
             {"score": {"chi2_per_sample": 1.49}},
-            {"score": {"chi2_per_sample": 4.0, "rmse": 40.0}},
+            {"score": {"chi2_per_sample": 4.0, "rmse": 40.0, "autocorrelation": 0.21}},
+            "(r1/nominal_stress 2.0 times): the model lacks something.",
+        ),
+        (
+            {"score": {"chi2_per_sample": 1.49}},
+            {"score": {"chi2_per_sample": 4.0, "rmse": 40.0, "autocorrelation": 0.19}},  # of 100 samples, by chance
+            "(r1/nominal_stress 2.0 times): what is left scatters from sample to sample, which missing physics does "
+            "not: check the noise level.",
+        ),
+        (
+            {"score": {"chi2_per_sample": 1.49}},
+            {"score": {"chi2_per_sample": 4.0, "rmse": 40.0, "n": 29}},  # so few can't tell
             "(r1/nominal_stress 2.0 times): the model lacks something.",
         ),
         (
