@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 MISFIT = 1.5  # chi-square per sample from which the misfit is called larger than the noise
 NO_NOTE = f"less than {OF_NOTE:.1%} of the largest value, which is of no note"
-SCATTER = "scatters from sample to sample, which missing physics does not"
+NO_PHYSICS = "scatters from sample to sample, which missing physics does not"
 WHITE = 30  # samples from which neighbours that do not agree tell that residuals are white
 SERIAL = 0.5  # lag-one correlation of residuals from which standard errors are called optimistic
 CONDITION = 1e6
@@ -156,7 +156,7 @@ def _misfit(found: "Fit") -> list[str]:
     if beyond_noise(found):
         why = "the model lacks something."
     elif scattered(found):
-        why = f"what is left {SCATTER}: check the noise level."
+        why = f"what is left {NO_PHYSICS}: check the noise level."
     else:
         why = f"by {NO_NOTE}; is the noise level right?"
     return [f"The misfit exceeds the noise ({shown}): {why} Standard errors were widened accordingly."]

@@ -3,7 +3,7 @@
 import math
 
 from tissuejax.energies.catalogue import name_of
-from tissuejax.fitting.advice import NO_NOTE, SCATTER, beyond_noise, misfits, scattered
+from tissuejax.fitting.advice import NO_NOTE, NO_PHYSICS, beyond_noise, misfits, scattered
 from tissuejax.fitting.result import Fit
 from tissuejax.report.scales import display, with_std
 
@@ -37,7 +37,9 @@ def overall(found: Fit) -> str:
     if bad:
         verdict = f"to within {max(bad.values()):.1f} times the noise, so something is missing from the model"
     elif scattered(found):
-        verdict = f"to within {max(small.values()):.1f} times the noise; what is left {SCATTER}: check the noise level"
+        verdict = (
+            f"to within {max(small.values()):.1f} times the noise; what is left {NO_PHYSICS}: check the noise level"
+        )
     elif small:
         verdict = f"to within {max(small.values()):.1f} times the noise; what is beyond it is {NO_NOTE}"
     ratio = found.chi2_per_dof
