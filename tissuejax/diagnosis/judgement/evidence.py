@@ -89,10 +89,8 @@ def read_evidence(path: Path) -> Evidence:
     """
     try:
         given = json.loads(Path(path).read_text())
-        tuples, left_out = (
-            {"keys", "names", "at_bound", "rest", "free"},
-            {"held"},
-        )  # what was written once, and never filled
+        tuples = {"keys", "names", "at_bound", "rest", "free"}
+        left_out = {"held"}  # what was written once, and never filled
         sets = [
             SetEvidence(**{k: tuple(v) if k in tuples else v for k, v in s.items() if k not in left_out})
             for s in given["sets"]
