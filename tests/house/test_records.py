@@ -50,7 +50,7 @@ ROUNDING = {
         "_within 1.5": "its largest",
     },
     "judgement/numbers.py": {"changed 0.99": "the largest share that is tried"},
-    "judgement/rest.py": {"wobble 4": "of the variance of a square"},
+    "judgement/rest.py": {"wobble 4": "of the variance of a square", "SLICES 200": "of a quadrature"},
     "judgement/reweigh.py": {"of 12": "nats of weight that no number brings to the top", "of 25": "sets at most: cost"},
     "judgement/sudden.py": {f"AMPLITUDES {x:g}": "of the quadrature" for x in (0.01, 4.0, 30)},
     "judgement/weigh.py": {"WILD 1000": "of the peak: a prediction gone wild"},

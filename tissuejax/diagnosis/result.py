@@ -172,7 +172,7 @@ class Diagnosis:
                 "information_criterion": s.chi2 + s.k * math.log(s.n) if math.isfinite(s.chi2) else None,
                 "chi2_per_sample": s.chi2 / s.n,
                 "held_out_chi2_per_sample": None,
-                "rest_share_of_peak": math.sqrt(s.rest[0]),
+                "rest_share_of_peak": s.rest_size,
                 "explained": s.explained,
             }
             for name, s in best.items()

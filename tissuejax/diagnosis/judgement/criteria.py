@@ -69,8 +69,10 @@ class Criteria:
             Ground: markers are seen to a tenth of what most of them move; half of that shows in no picture.
         alike: neighbouring means of samples of which a rest is one, in how surely its size is known. Ground: a rest is
             smooth, and as many lie within its finer lengths.
-        misstated: factor by which a stated noise level may be wrong: what scatters from sample to sample up to there
-            is noise, and beyond it a rest. Ground: a level read off a rest, or off another channel, is seldom worse.
+        misstated: factor by which a stated noise level is wrong, as a rule (standard deviation of its logarithm): what
+            scatters from sample to sample is noise of a level that was stated wrong, or a rest of its own, as large as
+            what is `strange`, with the probability that there is something `unknown`. Ground: a level read off a rest,
+            or off another channel, is seldom wrong by more than twice that.
         named: probability from which a name is given. Ground: likelier present than not (the median probability model
             of Barbieri and Berger 2004).
         covered: share of the probability of named sets that the alternatives offered add up to. Ground:

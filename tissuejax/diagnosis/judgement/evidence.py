@@ -5,6 +5,7 @@ Written beside the result as `evidence.json`, so that a verdict can be asked for
 
 import dataclasses
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,9 +32,10 @@ class SetEvidence:
         chi2, n: misfit over the stated noise without any discrepancy, block means, and how many there are.
         kurtosis: excess kurtosis of the whitened residuals: jumps that no part of the discrepancy has.
         explained: share of the base's misfit (beyond noise) that the set's model alone removes.
-        rest: mean square of the discrepancy left, as a share of the squared peak, and its standard deviation.
-        numerical: root mean square of what is laid to mesh and step of a simulation, a share of the peak.
-        free: paths of the free parameters; none in files of before they were kept.
+        rest: mean square of the discrepancy left, as a share of the squared peak, and its standard deviation; without
+            what scatters from sample to sample, but in files of before that was kept apart.
+        scattered: probability that something of what scatters from sample to sample beside the stated noise is a rest
+            (and not the noise, stated wrong), and its mean square then, as a share of the squared peak.
     """
 
     keys: tuple[str, ...]
@@ -52,7 +54,14 @@ class SetEvidence:
     explained: float
     rest: tuple[float, float]
     numerical: float = 0.0
+    scattered: tuple[float, float] = (0.0, 0.0)
     free: tuple[str, ...] = ()
+
+    @property
+    def rest_size(self) -> float:
+        """Root of the expected mean square of the rest, as a share of the peak, with what scatters and is no noise."""
+        chance, square = self.scattered
+        return math.sqrt(self.rest[0] + chance * square)
 
 
 @dataclass(frozen=True)
@@ -89,7 +98,7 @@ def read_evidence(path: Path) -> Evidence:
     """
     try:
         given = json.loads(Path(path).read_text())
-        tuples = {"keys", "names", "at_bound", "rest", "free"}
+        tuples = {"keys", "names", "at_bound", "rest", "scattered", "free"}
         left_out = {"held"}  # what was written once, and never filled
         sets = [
             SetEvidence(**{k: tuple(v) if k in tuples else v for k, v in s.items() if k not in left_out})

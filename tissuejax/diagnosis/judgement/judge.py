@@ -129,7 +129,11 @@ def negligible(s: SetEvidence, criteria: Criteria) -> float:
     """Probability that the rest's root mean square is below `Criteria.negligible` of the peak, beside what
     is laid to the simulation: a rest as small as that says nothing of the tissue."""
     mean, std = s.rest
-    return float(norm.cdf((criteria.negligible**2 + s.numerical**2 - mean) / max(std, 1e-300)))
+    chance, square = s.scattered
+    smooth, whole = norm.cdf(
+        (criteria.negligible**2 + s.numerical**2 - mean - np.array([0.0, square])) / max(std, 1e-300)
+    )
+    return float((1 - chance) * smooth + chance * whole)
 
 
 def left(s: SetEvidence) -> float:

@@ -6,12 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
+from scipy.stats import halfnorm, norm
 
 from tissuejax.diagnosis.judgement.marginal import Linear, smooth
 from tissuejax.estimation.discrepancy import Part
 
 if TYPE_CHECKING:
+    from tissuejax.diagnosis.judgement.criteria import Criteria
     from tissuejax.diagnosis.judgement.scales import Scales
+
+SLICES = 200  # in which an integral over a noise level is taken
 
 
 def beyond(scales: "Scales", linear: Linear, smoothed: np.ndarray, scatter: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -87,13 +91,38 @@ def scatter(scales: "Scales", parts: Sequence[Part], v: Float[np.ndarray, " K"])
     return extra / scales.blocked.sigma**2
 
 
-def unlike_noise(scales: "Scales", parts: Sequence[Part], v: Float[np.ndarray, " K"], misstated: float) -> float:
-    """Mean square of the scatter that a level stated wrong by `misstated` doesn't make, over the squared peak: spikes,
-    teeth of stick and slip. Nothing where the level was not stated, or is of a simulation too."""
+def unlike_noise(
+    scales: "Scales", parts: Sequence[Part], v: Float[np.ndarray, " K"], criteria: "Criteria"
+) -> tuple[float, float]:
+    """Whether something of what scatters from sample to sample is a rest (spikes, teeth of stick and slip): see
+    `told_apart`. Nothing where the level was not stated, or is of a simulation too."""
     if scales.bench.estimated or scales.bench.costly:
-        return 0.0
-    beyond = np.maximum(scatter(scales, parts, v) - (misstated**2 - 1), 0.0)
-    return float(np.mean(beyond * scales.blocked.sigma**2)) / scales.peak**2
+        return 0.0, 0.0
+    stated = float(np.mean(scales.blocked.sigma**2))
+    extra = float(np.mean(scatter(scales, parts, v) * scales.blocked.sigma**2))
+    return told_apart(math.sqrt(1 + extra / stated), math.sqrt(stated) / scales.peak, criteria)
+
+
+def told_apart(factor: float, stated: float, criteria: "Criteria") -> tuple[float, float]:
+    """Probability that not all is noise where samples scatter by `factor` times a `stated` level (a share of the peak),
+    and the mean square of what isn't then, a share of the squared peak.
+
+    One part of it is noise, whose level is some factor of the stated one (`Criteria.misstated`); the other a rest:
+    none, or, with the probability of what is unknown, one as large as what is strange.
+    """
+    if factor <= 1:
+        return 0.0, 0.0
+
+    def known(x):
+        return norm.pdf(np.log(x), scale=math.log(criteria.misstated)) / x
+
+    level = factor * (np.arange(SLICES) + 0.5) / SLICES  # of the noise, over the stated one
+    size = stated * np.sqrt(factor**2 - level**2)  # of the rest that this leaves
+    strange = halfnorm.pdf(size, scale=criteria.strange * criteria.shares["white"])
+    rests = known(level) * strange * stated**2 * factor / size * factor / SLICES  # d size / d factor times d level
+    one = criteria.unknown * float(np.sum(rests))
+    none = (1 - criteria.unknown) * float(known(factor))
+    return one / (one + none), float(rests @ size**2 / np.sum(rests))
 
 
 def level(scales: "Scales", parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> float:

@@ -280,7 +280,6 @@ def _described(scales: Scales, keys: Sequence[str], best: Round, criteria: Crite
     )
     precision = best.m.precision
     own = 0.5 * float(np.linalg.slogdet(precision)[1]) if len(precision) else 0.0
-    spiky = unlike_noise(scales, parts, v, criteria.misstated)
     # what is left of the evidence when the parameters' width is taken out of it
     density = best.m.value - best.ahead + own
     evidence = SetEvidence(
@@ -298,7 +297,8 @@ def _described(scales: Scales, keys: Sequence[str], best: Round, criteria: Crite
         n=n,
         kurtosis=float(kurtosis(whitened)),
         explained=float(np.clip(1 - max(chi2 - n, 0.0) / base, -1.0, 1.0)),
-        rest=(float(np.mean(left**2 + open_still)) + spiky, wobble(left, open_still, criteria.alike)),
+        rest=(float(np.mean(left**2 + open_still)), wobble(left, open_still, criteria.alike)),
+        scattered=unlike_noise(scales, parts, v, criteria),
         numerical=numerical(scales, parts, v),
         free=tuple(fit.values),
     )
