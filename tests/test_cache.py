@@ -14,6 +14,7 @@ import pytest
 from tissuejax.cache import key, programs, source
 from tissuejax.cache.key import described
 from tissuejax.cache.programs import Kept
+from tissuejax.diagnosis.material import MaterialBench
 from tissuejax.effects.drift import Drift
 from tissuejax.energies.catalogue import energy
 from tissuejax.energies.fibre import WithFibre
@@ -21,6 +22,7 @@ from tissuejax.energies.neo_hookean import NeoHookean
 from tissuejax.errors import InputError
 from tissuejax.estimation.series import Segment
 from tissuejax.model import Model
+from tissuejax.recordings.recording import Channel, Recording, Sample
 from tissuejax.surrogate.live import compiler
 
 
@@ -243,6 +245,23 @@ def test_a_program_that_calls_back_runs_and_is_not_kept(kept_in):
     assert np.allclose(Kept(calls_back, "calls back")(A), np.cos(A), atol=1e-15)
     assert np.allclose(Kept(calls_back, "calls back")(A), np.cos(A), atol=1e-15)
     assert not kept_in.exists()
+
+
+def test_every_prediction_of_a_material_test_can_be_kept():
+    """One that calls back into Python has no form on disk, and every process would compile it anew."""
+    time, stretch = np.arange(40.0), 1 + 0.005 * np.arange(40)
+    stress = Channel(time, 1000 * (stretch - 1), "Pa", 2.0)
+    recording = Recording("r1", "uniaxial", {"time": time, "stretch": stretch}, {"nominal_stress": stress}, {})
+    bench = MaterialBench.of(Sample("s", {"r1": recording}), energy("neo-hookean"), ("r1",), (), {"r1": 2.0})
+    fibred = next(c.paths for c in bench.candidates.values() if c.name == "anisotropy")
+    both = (*bench.candidates["compressibility"].paths, *fibred)
+    tried = [*(c.paths for c in bench.candidates.values()), both]
+    built = {id(p): p for p in (bench._program(dict.fromkeys((*bench.base, *paths), 0.0)) for paths in tried)}
+    assert len(built) > 6
+    for program in built.values():
+        leaves, tree = jax.tree.flatten((program.places["r1"][0], bench._tests["r1"]))
+        flat = jax.jit(lambda *x, p=program, tree=tree: p.run._function(*jax.tree.unflatten(tree, x)))
+        assert jax.export.export(flat)(*leaves).serialize()
 
 
 def test_a_model_s_text_holds_its_laws_and_their_numbers():

@@ -11,7 +11,7 @@ where the linearised program takes three times as long to compile as the predict
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -80,11 +80,12 @@ def lengthened(test: MaterialTest, n: int) -> MaterialTest:
 def lengths(samples: Sequence[int]) -> list[int]:
     """To how many samples recordings of a sample are lengthened: few lengths, few compilations.
 
-    The longest to the next of 128, 192, 256, 384, 512, ..., the others to that or a half, a quarter, ... of it.
+    The longest to the next of 128, 192, 256, 384, 512, ..., the others to that or a quarter, a sixteenth, ... of it:
+    a program for another length takes as long to compile as it takes to run thousands of times.
     """
     power = max(SHORTEST, 2 ** math.ceil(math.log2(max(samples))))
     top = 3 * power // 4 if power > SHORTEST and max(samples) <= 3 * power // 4 else power
-    steps = [top >> k for k in range(top.bit_length()) if k == 0 or (top >> k) >= SHORTEST]
+    steps = [top >> k for k in range(0, top.bit_length(), 2) if k == 0 or (top >> k) >= SHORTEST]
     return [min(step for step in steps if step >= n) for n in samples]
 
 
@@ -256,16 +257,22 @@ class MaterialBench(Bench):
         """See `Bench.predict`."""
         values = {**self.known, **values}
         program = self._program(values)
-        out = self.y.copy()
-        for name in recordings or self._tests:
-            self._put(out, name, self._run(program, self._theta(program, values, name), name))
+        out, names = self.y.copy(), list(recordings or self._tests)
+        runs = [(program, self._theta(program, values, name), name) for name in names]
+        for name, stress in zip(names, self._run(runs), strict=True):
+            self._put(out, name, stress)
         return out
 
-    def _run(self, program: Program, theta: Float[np.ndarray, " p"], name: str) -> Float[np.ndarray, "n ..."]:
-        """One prediction; NaN where the faces of a specimen could not be found at such parameters."""
-        self.spent += program.price
+    def _run(self, runs: Sequence[tuple[Program, Float[np.ndarray, " p"], str]]) -> list[Float[np.ndarray, "n ..."]]:
+        """Predictions of recordings; NaN where the faces of a specimen could not be found at such parameters. All are
+        begun before the first is waited for: they run beside each other where there are cores."""
+        self.spent += sum(program.price for program, _, _ in runs)
+        begun = [self._found(lambda p=p, t=t, n=n: p.run(t, self._tests[n]), n) for p, t, n in runs]
+        return [self._found(lambda y=y: np.asarray(y), name) for y, (_, _, name) in zip(begun, runs, strict=True)]
+
+    def _found(self, get: Callable[[], Array | np.ndarray], name: str) -> Array | np.ndarray:
         try:
-            return np.asarray(program.run(theta, self._tests[name]))
+            return get()
         except (ValueError, RuntimeError) as error:  # raised inside the compiled program by its linear solver
             if "non-finite" not in str(error):
                 raise
@@ -291,22 +298,18 @@ class MaterialBench(Bench):
     ) -> Float[np.ndarray, "N k"]:
         """Second less first prediction of every pair of settings, equal ones run once; zero where both are the same."""
         out = np.zeros((len(pairs), len(self.y)))
-        groups: dict[Program, list[int]] = {}
-        for i, (_, moved) in enumerate(pairs):
-            groups.setdefault(self._program(moved), []).append(i)
-        for program, members in groups.items():
-            for name in recordings or self._tests:
-                thetas: dict[bytes, np.ndarray] = {}
-                ends = []
-                for i in members:
-                    two = [self._theta(program, values, name) for values in pairs[i]]
-                    ends.append([t.tobytes() for t in two])
-                    if ends[-1][0] != ends[-1][1]:
-                        thetas.update(zip(ends[-1], two))
-                known = {k: self._run(program, t, name) for k, t in thetas.items()}
-                for i, (before, after) in zip(members, ends):
-                    if before != after:
-                        self._put(out[i], name, known[after] - known[before])
+        programs = [self._program(moved) for _, moved in pairs]
+        runs, ends = {}, {}
+        for name in recordings or self._tests:
+            for i, program in enumerate(programs):
+                two = [self._theta(program, values, name) for values in pairs[i]]
+                ends[i, name] = [(id(program), name, theta.tobytes()) for theta in two]
+                if ends[i, name][0] != ends[i, name][1]:
+                    runs |= {key: (program, theta, name) for key, theta in zip(ends[i, name], two, strict=True)}
+        known = dict(zip(runs, self._run([*runs.values()]), strict=True))
+        for (i, name), (before, after) in ends.items():
+            if before != after:
+                self._put(out[i], name, known[after] - known[before])
         return out.T
 
     def nested(self, keys: Sequence[str]) -> int:
