@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from tissuejax.challenge.sensor_noise import Chain, chain, correlated, filtered
+from tissuejax.challenge.sensor_noise import Chain, chain, correlated, filtered, misstated
 
 
 def test_correlated_noise_has_the_recorded_marginal_deviation(rng):
@@ -48,3 +48,10 @@ def test_every_kind_of_noise_is_drawn():
     white = sum(c == Chain() for c in drawn)
     kinds = [sum(getattr(c, k) > 0 for c in drawn) for k in ("correlation", "corner", "rounding")]
     np.testing.assert_allclose(np.array([white, *kinds]) / 2000, [0.4, 0.25, 0.175, 0.175], atol=0.04)
+
+
+def test_a_level_is_stated_wrong_in_one_of_four_either_way_alike():
+    drawn = np.log2([misstated(np.random.default_rng(i)) for i in range(2000)])
+    assert np.mean(drawn == 0) == pytest.approx(0.75, abs=0.03)
+    assert np.mean(drawn) == pytest.approx(0.0, abs=0.03)
+    assert 0.95 < np.max(np.abs(drawn)) <= 1

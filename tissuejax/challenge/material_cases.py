@@ -7,7 +7,7 @@ import numpy as np
 from tissuejax.challenge.material import Ingredient, Specimen, reported
 from tissuejax.challenge.menu import CATALOGUED, NAMES, STRAY, Choice, Setting
 from tissuejax.challenge.protocols import trials
-from tissuejax.challenge.sensor_noise import STEP, chain
+from tissuejax.challenge.sensor_noise import STEP, chain, misstated
 from tissuejax.challenge.specimen import Trial
 from tissuejax.challenge.strain_laws import Body
 from tissuejax.challenge.strengths import beyond, reach
@@ -114,12 +114,12 @@ def _draw(name: str, rng: np.random.Generator, kind: str, turn: int) -> Case:
     top = max(float(np.abs(c).max()) for c in clean)
     noise = float(f"{top * np.exp(rng.uniform(np.log(0.004), np.log(0.012))):.3g}")
     sensor = chain(rng)
-    stated = noise * sensor.level
-    setting = Setting(base, plan, stated, top)
+    level = noise * sensor.level
+    setting = Setting(base, plan, level, top)
     fitted = plan[:-1]
 
     def size(specimen: Specimen) -> float:
-        return beyond(energy, fitted, [reported(specimen, t) for t in fitted], stated)
+        return beyond(energy, fitted, [reported(specimen, t) for t in fitted], level)
 
     added, sizes = [], {}
     low, high = (1.5, 30.0) if kind == "unknown" else (0.5, 30.0) if kind == "one" else (1.5, 25.0)
@@ -146,7 +146,8 @@ def _draw(name: str, rng: np.random.Generator, kind: str, turn: int) -> Case:
         t.name: np.stack([sensor.read(rng, t.time, c, noise) for c in x.reshape(len(x), -1).T], -1).reshape(x.shape)
         for t, x in zip(plan, truth)
     }
-    errors = {t.name: (stress[t.name] - x) / stated for t, x in zip(plan, truth)}
+    stated = float(f"{level * misstated(rng):.3g}")
+    errors = {t.name: (stress[t.name] - x) / stated for t, x in zip(plan, truth)}  # as a diagnosis counts them
     key = {
         "category": kind,
         "effects": [c.name for c in picked],
@@ -157,7 +158,7 @@ def _draw(name: str, rng: np.random.Generator, kind: str, turn: int) -> Case:
         "size_over_noise": sizes,
         "all_over_noise": size(specimen),
         "base": {"energy": energy, **base.terms},
-        "noise": {"std": stated, "over": STEP, **asdict(sensor)},
+        "noise": {"std": level, "stated": stated / level, "over": STEP, **asdict(sensor)},
         "truth_error_over_noise": {name: float(np.sqrt(np.mean(e**2))) for name, e in errors.items()},
         "held_out": plan[-1].name,
     }

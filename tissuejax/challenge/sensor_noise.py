@@ -51,6 +51,11 @@ def chain(rng: np.random.Generator) -> Chain:
     return Chain()
 
 
+def misstated(rng: np.random.Generator) -> float:
+    """What is stated of a noise level, over the true one: in one of four wrong, by up to a factor of two."""
+    return float(np.exp(rng.uniform(-np.log(2.0), np.log(2.0)))) if rng.random() < 0.25 else 1.0
+
+
 def correlated(rng: np.random.Generator, time: Float[np.ndarray, " n"], rho: float) -> Float[np.ndarray, " n"]:
     """Noise of unit variance at `time` (s) whose correlation over `STEP` is rho, white at rho = 0.
 
