@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+import trimesh
 
 from tissuejax.cache import source
 from tissuejax.cli import _warned, commands, listed, main
@@ -175,6 +176,14 @@ def test_refusals_are_one_sentence_and_exit_code_2(argv, words, capsys):
     assert code == 2
     assert words in json.loads(out)["error"]
     assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("verb", [["inspect"], ["fit", "--energy", "neo-hookean"]])
+def test_a_body_leads_to_the_side_file_of_a_probing(verb, tmp_path, capsys):
+    ball = tmp_path / "ball.stl"
+    trimesh.creation.icosphere(1).export(ball)
+    assert main([*verb, str(ball)]) == 2
+    assert "side file of a probing" in capsys.readouterr().err
 
 
 def test_an_empty_file_is_refused(tmp_path, capsys):

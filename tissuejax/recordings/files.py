@@ -25,6 +25,8 @@ from tissuejax.storage import shown
 
 __all__ = ["formats", "names", "read", "read_all", "reader", "write"]
 
+BODIES = (".stl", ".ply", ".obj", ".off", ".vtu", ".vtk", ".msh", ".inp")  # endings of surfaces and meshes
+
 
 def formats() -> dict[str, Format]:
     """The formats that can be read, by name."""
@@ -127,4 +129,9 @@ def _format(path: Path) -> Format:
     for kind in known.values():
         if kind.recognises(path, head):
             return kind
+    if path.suffix.lower() in BODIES:
+        raise InputError(
+            f"{path}: found a body, expected recordings: name it in the side file of a probing, as `surface` or `mesh` "
+            "of [body] beside a [[probing]] for each press (docs/own-probing.md; data/probing is an example)"
+        )
     raise InputError(f"{path}: found a file of another format, expected one of: {what}")
