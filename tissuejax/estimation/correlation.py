@@ -39,6 +39,7 @@ MISSTATED = 2.0  # factor by which a recorded level may be wrong: levels that ar
 GAIN = 8.0  # twice the log-likelihood by which correlated noise must beat white: 2 Akaike units a parameter beyond cost
 SHARES, TAUS, WALKS = 6, 7, 9  # tried at once of the share, the time, the intensity of the walk: one program
 ROUNDS = 3  # of trials, each in a narrower range
+NEWTON = 3  # steps to the likeliest level
 DIFFUSE = 1e4  # prior variance of the mismatch's level over that of the residual
 NEVER_WHITE, FILTERED = 1e-3, 1e-6  # least share of white noise that is tried; of a recorded level behind a filter
 LOGITS = -4.5, 6.5, 13.5  # of the shares that are tried: the least, and the greatest of either
@@ -158,17 +159,31 @@ class _Surface:
         logs, squares = (np.sum([np.asarray(part[i]) for part in parts], axis=0) for i in (0, 1))
         n = self.n * len(parts)
         # white noise may exceed what was recorded, nothing else is like it; correlated noise may not
-        variance = (
-            np.clip(squares / n, 1e-300, np.where((trials[0] > 0) & self.capped, 1.0, np.inf))
-            if free
-            else np.ones(len(logs))
-        )
-        likelihood = -0.5 * (n * np.log(variance) + logs + squares / variance)
+        most = np.where((trials[0] > 0) & self.capped, 1.0, np.inf)
+        variance = np.minimum(_levels(squares, n, self.capped), most) if free else np.ones(len(logs))
+        likelihood = -0.5 * (n * np.log(variance) + logs + squares / variance + _unlikely(variance, self.capped))
         shape = (len(shares), len(taus), len(walks))
         likelihood, variance = likelihood.reshape(shape), variance.reshape(shape)
         at = np.argmax(likelihood, axis=2)[..., None]
         best, level = (np.take_along_axis(x, at, 2)[..., 0] for x in (likelihood, variance))
         return best, np.asarray(walks)[at[..., 0]], level
+
+
+def _unlikely(variance: Float[np.ndarray, " t"], recorded: bool) -> Float[np.ndarray, " t"]:
+    """Minus twice the log probability of a variance over the recorded one: as often twice the level as half of it. A
+    mismatch that may be anything could take all of a residual up, and the noise were of any level below."""
+    return (0.5 * np.log(variance) / math.log(MISSTATED)) ** 2 if recorded else np.zeros_like(variance)
+
+
+def _levels(squares: Float[np.ndarray, " t"], n: int, recorded: bool) -> Float[np.ndarray, " t"]:
+    """The likeliest variance over the recorded one, where `n` samples have such sums of squares: Newton in its
+    logarithm, of a convex function."""
+    log = np.log(np.maximum(squares / n, 1e-300))  # without a prior, which is of as much weight as a sample or two
+    stiff = 0.5 / math.log(MISSTATED) ** 2
+    for _ in range(NEWTON if recorded else 0):
+        seen = squares * np.exp(-log)
+        log = log - (n - seen + stiff * log) / (seen + stiff)
+    return np.exp(log)
 
 
 @dataclass(frozen=True)
