@@ -36,6 +36,8 @@ class SetEvidence:
             what scatters from sample to sample, but in files of before that was kept apart.
         scattered: probability that something of what scatters from sample to sample beside the stated noise is a rest
             (and not the noise, stated wrong), and its mean square then, as a share of the squared peak.
+        numerical: root mean square of what is laid to mesh and step of a simulation, a share of the peak.
+        free: paths of the free parameters; none in files of before they were kept.
     """
 
     keys: tuple[str, ...]
@@ -53,8 +55,8 @@ class SetEvidence:
     kurtosis: float
     explained: float
     rest: tuple[float, float]
-    numerical: float = 0.0
     scattered: tuple[float, float] = (0.0, 0.0)
+    numerical: float = 0.0
     free: tuple[str, ...] = ()
 
     @property
