@@ -17,7 +17,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.signal import lfilter
 
 from tissuejax.estimation.correlation import LEAST, Series, estimate
 from tissuejax.estimation.noise import Noise
@@ -119,6 +118,8 @@ def description(time: Float[np.ndarray, " n"], drive: Float[np.ndarray, " n"]) -
 
 def _fading(time: np.ndarray, x: np.ndarray, tau: float) -> np.ndarray:
     """Part of x that was imposed within about tau: increments that fade; exact between samples of a straight x."""
+    from scipy.signal import lfilter  # it takes half a second to load, and few recordings come without a level
+
     even = np.linspace(time[0], time[-1], len(time))
     step = even[1] - even[0]
     keep = math.exp(-step / tau)

@@ -6,7 +6,7 @@ Source: Student 1908, Biometrika 6:1.
 import math
 from statistics import NormalDist
 
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 
 def quantile(confidence: float = 0.95, dof: float = math.inf) -> float:
@@ -17,5 +17,5 @@ def quantile(confidence: float = 0.95, dof: float = math.inf) -> float:
         dof: degrees of freedom from which the noise level was estimated; infinite where it is known.
     """
     if math.isfinite(dof):
-        return float(student.ppf(0.5 + confidence / 2, dof))
+        return float(stdtrit(dof, 0.5 + confidence / 2))
     return NormalDist().inv_cdf(0.5 + confidence / 2)

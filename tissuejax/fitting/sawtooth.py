@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
-from scipy.signal import butter, find_peaks, sosfiltfilt
 
 from tissuejax.errors import InputError
 from tissuejax.experiments.cutting_record import against_motion, path_of
@@ -90,6 +89,8 @@ def sawtooth(recording: Recording, geometry: Geometry, settings: Settings | None
     Raises:
         InputError: too few samples, a cut-off beyond half the sampling rate, no tooth in the record.
     """
+    from scipy.signal import butter, find_peaks, sosfiltfilt  # half a second to load, and every page loads this room
+
     settings = settings or Settings()
     path = path_of(recording, geometry)
     channel = recording.channels["force"]

@@ -10,8 +10,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
-from SALib.analyze import sobol as analysis
-from SALib.sample import sobol as sampling
 
 from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.predictor import Predictor
@@ -74,6 +72,9 @@ def sobol(
     Raises:
         InputError: fewer than two parameters, an unknown path, an empty or infinite range, n not a power of two.
     """
+    from SALib.analyze import sobol as analysis  # it brings pandas along, a third of a second for all pages
+    from SALib.sample import sobol as sampling
+
     paths = tuple(ranges)
     declared = predictor.model.parameters
     for path, (low, high) in ranges.items():

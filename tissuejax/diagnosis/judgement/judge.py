@@ -24,8 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import logsumexp
-from scipy.stats import norm
+from scipy.special import logsumexp, ndtr
 
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import Evidence, SetEvidence
@@ -130,9 +129,7 @@ def negligible(s: SetEvidence, criteria: Criteria) -> float:
     is laid to the simulation: a rest as small as that says nothing of the tissue."""
     mean, std = s.rest
     chance, square = s.scattered
-    smooth, whole = norm.cdf(
-        (criteria.negligible**2 + s.numerical**2 - mean - np.array([0.0, square])) / max(std, 1e-300)
-    )
+    smooth, whole = ndtr((criteria.negligible**2 + s.numerical**2 - mean - np.array([0.0, square])) / max(std, 1e-300))
     return float((1 - chance) * smooth + chance * whole)
 
 

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import halfnorm, norm
 
 from tissuejax.diagnosis.judgement.marginal import Linear, smooth
 from tissuejax.estimation.discrepancy import Part
@@ -114,15 +113,20 @@ def told_apart(factor: float, stated: float, criteria: "Criteria") -> tuple[floa
         return 0.0, 0.0
 
     def known(x):
-        return norm.pdf(np.log(x), scale=math.log(criteria.misstated)) / x
+        return normal(np.log(x), math.log(criteria.misstated)) / x
 
     level = factor * (np.arange(SLICES) + 0.5) / SLICES  # of the noise, over the stated one
     size = stated * np.sqrt(factor**2 - level**2)  # of the rest that this leaves
-    strange = halfnorm.pdf(size, scale=criteria.strange * criteria.shares["white"])
+    strange = 2 * normal(size, criteria.strange * criteria.shares["white"])
     rests = known(level) * strange * stated**2 * factor / size * factor / SLICES  # d size / d factor times d level
     one = criteria.unknown * float(np.sum(rests))
     none = (1 - criteria.unknown) * float(known(factor))
     return one / (one + none), float(rests @ size**2 / np.sum(rests))
+
+
+def normal(x: Float[np.ndarray, "..."] | float, scale: float) -> Float[np.ndarray, "..."]:
+    """Density of a normal distribution about nothing."""
+    return np.exp(-0.5 * (np.asarray(x) / scale) ** 2) / (scale * math.sqrt(2 * math.pi))
 
 
 def level(scales: "Scales", parts: Sequence[Part], v: Float[np.ndarray, " K"]) -> float:

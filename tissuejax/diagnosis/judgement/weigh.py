@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float
 from scipy.special import erfcx
-from scipy.stats import kurtosis
 
 from tissuejax.diagnosis.bench import Bench, Candidate
 from tissuejax.diagnosis.judgement.criteria import Criteria
@@ -295,7 +294,7 @@ def _described(scales: Scales, keys: Sequence[str], best: Round, criteria: Crite
         void=void,
         chi2=chi2,
         n=n,
-        kurtosis=float(kurtosis(whitened)),
+        kurtosis=kurtosis(whitened),
         explained=float(np.clip(1 - max(chi2 - n, 0.0) / base, -1.0, 1.0)),
         rest=(float(np.mean(left**2 + open_still)), wobble(left, open_still, criteria.alike)),
         scattered=unlike_noise(scales, parts, v, criteria),
@@ -304,6 +303,12 @@ def _described(scales: Scales, keys: Sequence[str], best: Round, criteria: Crite
     )
     size = scales.peak if scales.size is None else scales.size
     return Weighed(evidence, fit, v, parts, left * size, bench, linear=best.linear)
+
+
+def kurtosis(x: Float[np.ndarray, " n"]) -> float:
+    """Fourth moment over the square of the second, less that of a normal distribution."""
+    square = (x - np.mean(x)) ** 2
+    return float(np.mean(square**2) / np.mean(square) ** 2) - 3.0
 
 
 def _resting(c: Candidate, fit: Refit, bench: Bench, at_bound: Sequence[str], v: np.ndarray, families) -> bool:
