@@ -53,7 +53,7 @@ ROUNDING = {
     "judgement/rest.py": {"wobble 4": "of the variance of a square", "SLICES 200": "of a quadrature"},
     "judgement/reweigh.py": {"of 12": "nats of weight that no number brings to the top", "of 25": "sets at most: cost"},
     "judgement/sudden.py": {f"AMPLITUDES {x:g}": "of the quadrature" for x in (0.01, 4.0, 30)},
-    "judgement/weigh.py": {"WILD 1000": "of the peak: a prediction gone wild"},
+    "judgement/weigh.py": {"WILD 1000": "of the peak: a prediction gone wild", "kurtosis 3": "that of a normal one"},
     "diagnosis/offered.py": {"direction 6": "digits of a direction"},
     "diagnosis/starts.py": {
         "inside 30": "scales that a linear step may go", "inside 0.9": "of a step to a bound", "inside 0.1": "its rest",
