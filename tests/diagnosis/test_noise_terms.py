@@ -1,12 +1,17 @@
 """What is noise and what is not: correlated noise is no rest, a level stated too low is none, spikes are one."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import butter, lfilter
 
-from tissuejax.diagnosis.diagnose import diagnose
+from tissuejax.diagnosis.diagnose import asked_of, diagnose
 from tissuejax.diagnosis.judgement.coloured import means_covariance
+from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.effort import Effort
+from tissuejax.diagnosis.judgement.reweigh import Found, reweighed
 from tissuejax.estimation.noise import Noise
 from tissuejax.recordings.recording import Channel, Recording, Sample
 from tissuejax.report.judged_sentences import sure
@@ -59,6 +64,11 @@ def filtered(rng, time, stress):
     return stress + NOISE * drawn / np.sqrt(answer @ answer)
 
 
+def hummed(kind, frequency):
+    """Noise of a kind under a hum of twelve times its size, that hides in the base's residual how it is carried."""
+    return lambda rng, time, s: kind(rng, time, s) + 12 * NOISE * np.sin(2 * np.pi * frequency * time + 0.4)
+
+
 def spiky(rng, time, stress):
     hit = rng.random(len(time)) < 0.06
     return stress + NOISE * (rng.standard_normal(len(time)) + 40 * hit * rng.standard_normal(len(time)))
@@ -87,6 +97,28 @@ def test_nor_is_it_where_its_level_was_not_recorded():
     answer = asked(recorded(carried, stated=None))
     assert answer.verdict.kind == "nothing-missing"
     assert answer.as_dict()["rest"]["share_of_peak"] < 0.004
+
+
+@pytest.mark.parametrize(("kind", "frequency"), [(filtered, 0.7), (carried, 3.0)])
+def test_noise_is_read_again_beside_the_mismatch_that_hid_it(kind, frequency):
+    sample = recorded(hummed(kind, frequency))
+    once = diagnose(sample, "neo-hookean", effects=TRIED, effort=replace(QUICK, readings=0))
+    again = asked(sample)
+    assert [e["name"] for e in again.as_dict()["effects"]] == ["periodic"]
+    assert again.verdict.kind == "found"
+    assert again.as_dict()["rest"]["share_of_peak"] < 0.5 * once.as_dict()["rest"]["share_of_peak"]
+
+
+def test_sets_weighed_again_are_weighed_under_that_noise_too():
+    sample = recorded(hummed(carried, 3.0))
+    answered = asked(sample).answered
+    stored = Found.read(json.loads(json.dumps(Found.of(answered.exploration, answered.evidence.held_out).as_dict())))
+    bench = asked_of(sample, "neo-hookean", effects=TRIED)
+    evidence = reweighed(bench.whole, *bench.left(), stored, Criteria())
+    before = {s.keys: s.log_evidence for s in answered.evidence.sets}
+    after = {s.keys: s.log_evidence for s in evidence.sets}
+    settled = answered.exploration.effort.course.settled
+    assert {k: before[k] for k in after} == pytest.approx(after, abs=2 * settled)
 
 
 @pytest.mark.parametrize(

@@ -2,8 +2,8 @@
 
 A noise level, recorded or estimated, is that of single samples, and says nothing of how much of it a filter or an
 amplifier carries from one to the next. Taken for white, what is carried would be left over in means of many samples and
-be called a rest. So the share that is correlated, and its time, are read from the residual of the base model beside
-whatever mismatch it holds (`estimation.correlation`); the level stays what it was.
+be called a rest. So the share that is correlated, and its time, are read from the residual of a model (of the
+base first) beside whatever mismatch it holds (`estimation.correlation`); the level stays what it was.
 """
 
 from dataclasses import replace
@@ -28,6 +28,12 @@ def coloured(blocked: Blocked, bench: Bench, cut: Blocks, prediction: Float[np.n
         return None
     noise = tuple(_segment(bench, cut, misfit, i, s) for i, s in enumerate(bench.segments))
     return replace(blocked, sigma=np.sqrt(np.concatenate([np.diag(n) for n in noise])), noise=noise)
+
+
+def shown(blocked: Blocked, bench: Bench, cut: Blocks, prediction: Float[np.ndarray, " N"]) -> Blocked:
+    """The same blocks under the noise that the residual of `prediction` shows, white or not."""
+    noise = coloured(blocked, bench, cut, prediction)
+    return replace(blocked, sigma=cut.spread(bench.sigma), noise=None) if noise is None else noise
 
 
 def _segment(bench: Bench, cut: Blocks, misfit: Misfit, i: int, s: Segment) -> Float[np.ndarray, "M M"]:

@@ -38,6 +38,7 @@ class Exploration:
         weighed: by set of keys.
         scored: linear scores at each set that was extended.
         kept: where sets are kept for a search that is begun again.
+        noise_of: the set whose residual the noise was read from; None for the base.
     """
 
     bench: Bench
@@ -49,6 +50,7 @@ class Exploration:
     scored: dict[frozenset, list[Score]] = field(default_factory=dict)
     exhausted: bool = False
     kept: Kept = field(default_factory=Kept)
+    noise_of: Weighed | None = None
 
     @cached_property
     def before(self) -> Beforehand:
@@ -130,7 +132,7 @@ class Exploration:
         if order and self.bench.spent > effort.spend:
             self.exhausted = True
             return None
-        self._tell("weighing", order)
+        self.tell("weighing", order)
         begin = [Start(s, v, bench) for s in starts]
         if len(begin) > 1:
             short = replace(effort.course, rounds=1, iterations=effort.trial)
@@ -154,7 +156,7 @@ class Exploration:
         """Every candidate that may join the set, by the log evidence that its linear step gains, best first."""
         if key in self.scored:
             return self.scored[key]
-        self._tell("trying every effect beside", sorted(self.names(key)))
+        self.tell("trying every effect beside", sorted(self.names(key)))
         at, names = self.weighed[key], self.names(key)
         left = [
             c
@@ -309,7 +311,7 @@ class Exploration:
         """
         while left := [k for k in self.near(size) if not self.weighed[k].settled]:
             w = self.weighed[left[0]]
-            self._tell("settling", w.evidence.keys)
+            self.tell("settling", w.evidence.keys)
             again = self._settled(w, at := w.refit.values, w.v)
             if again.evidence.log_evidence == -math.inf:  # the fine simulation breaks down there
                 again = self._settled(w, {**at, **{p: self.scales.values[p] for p in self.bench.base}})
@@ -321,7 +323,7 @@ class Exploration:
     def look_again(self) -> None:
         """Weigh the best sets and the base anew beside what may have happened at once by the best of them."""
         while (moment := happened(self.scales, self.weighed[self.best], self.criteria)) is not None:
-            self._tell("looking at what happened at once beside", sorted(self.names(self.best)))
+            self.tell("looking at what happened at once beside", sorted(self.names(self.best)))
             best = sorted(self.weighed, key=self.worth)[: -self.effort.again - 1 : -1]
             self.scales = joined(self.scales, moment)
             for key, w in self.weighed.items():
@@ -333,7 +335,7 @@ class Exploration:
             if not held(self.weighed[self.best], moment):
                 break
 
-    def _tell(self, stage: str, order: Sequence[str]) -> None:
+    def tell(self, stage: str, order: Sequence[str]) -> None:
         """Report what is done now, and the best so far."""
         best = " + ".join(sorted(self.names(self.best))) if self.weighed else ""
         self.report(f"{stage} {' + '.join(order) or 'base model'}; best so far: {best or 'base model'}")

@@ -13,6 +13,7 @@ import numpy as np
 
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.judgement.blocks import Blocks
+from tissuejax.diagnosis.judgement.coloured import shown
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.effort import Course, Effort
 from tissuejax.diagnosis.judgement.evidence import Evidence
@@ -48,6 +49,11 @@ class Rested:
         """Of a set that was weighed."""
         return cls(w.evidence.keys, dict(w.refit.values), tuple(w.v.tolist()), dict(w.begun))
 
+    @classmethod
+    def read(cls, given: Mapping) -> "Rested":
+        """From a file."""
+        return cls(tuple(given["keys"]), given["values"], tuple(given["v"]), given["begun"])
+
     def start(self, parts: int | None = None) -> Start:
         """From there; with the amplitudes of the first `parts` alone."""
         return Start(dict(self.begun), np.array(self.v[:parts]), at=dict(self.values))
@@ -61,11 +67,13 @@ class Found:
         sets: where sets came to rest, the base first.
         moments: names of what may have happened at once, as they came in.
         held_out: recordings so called.
+        noise_of: where the set came to rest whose residual the noise was read from; None for the base.
     """
 
     sets: tuple[Rested, ...]
     moments: tuple[str, ...] = ()
     held_out: tuple[str, ...] = ()
+    noise_of: Rested | None = None
 
     @classmethod
     def of(cls, e: Exploration, held_out: Sequence[str] = (), near: float = 12.0, most: int = 25) -> "Found":
@@ -83,7 +91,8 @@ class Found:
         kept = [w for w in ranked if w.evidence.keys and weight[w.evidence.keys] > top - near][:most]
         of = e.scales.discrepancy
         moments = tuple(m.name for m in of.sudden) if isinstance(of, Discrepancy) else ()
-        return cls(tuple(Rested.of(w) for w in (e.weighed[frozenset()], *kept)), moments, tuple(held_out))
+        noise_of = None if e.noise_of is None else Rested.of(e.noise_of)
+        return cls(tuple(Rested.of(w) for w in (e.weighed[frozenset()], *kept)), moments, tuple(held_out), noise_of)
 
     def as_dict(self) -> dict:
         """For a file."""
@@ -92,8 +101,9 @@ class Found:
     @classmethod
     def read(cls, given: Mapping) -> "Found":
         """From `as_dict`."""
-        sets = tuple(Rested(tuple(s["keys"]), s["values"], tuple(s["v"]), s["begun"]) for s in given["sets"])
-        return cls(sets, tuple(given["moments"]), tuple(given["held_out"]))
+        sets, beside = tuple(Rested.read(s) for s in given["sets"]), given["noise_of"]
+        noise_of = None if beside is None else Rested.read(beside)
+        return cls(sets, tuple(given["moments"]), tuple(given["held_out"]), noise_of)
 
 
 def reweighed(
@@ -116,6 +126,8 @@ def reweighed(
     # what happened at once comes in last: it begins beside the base with all else
     start = base.start(len(base.v) - len(found.moments))
     scales, _ = based(bench, cut, of, criteria, replace(effort, course=course), Kept(), start)
+    if found.noise_of is not None:
+        scales.blocked = shown(scales.blocked, scales.bench, cut, scales.bench.predict(found.noise_of.values))
     known = {m.name: m for m in scanned(scales)} if found.moments else {}
     for name in found.moments:
         if name not in known:

@@ -3,23 +3,30 @@
 Where even the best single effect leaves a part of the discrepancy that is likelier something unknown, every effect is
 tried in all its forms. What happened at once comes in before the pairs where it describes the recordings better, beside
 the base, than any single effect does, and at the end beside the best sets.
+
+How noise is correlated in time is read from the base's residual first. A mismatch that is as quick as the noise hides
+it there, so it is read again from what the best set leaves; where that set is likelier under it all sets are weighed
+anew, for sets are compared under one noise.
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from tissuejax.diagnosis.bench import Bench, Free
 from tissuejax.diagnosis.judgement.blocks import Blocks
-from tissuejax.diagnosis.judgement.coloured import coloured
+from tissuejax.diagnosis.judgement.coloured import coloured, shown
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.judgement.explore import Exploration
 from tissuejax.diagnosis.judgement.kept import Kept
+from tissuejax.diagnosis.judgement.marginal import Blocked
 from tissuejax.diagnosis.judgement.scales import Scales, scaled
 from tissuejax.diagnosis.judgement.sudden import disrupted
 from tissuejax.diagnosis.judgement.weigh import Start, Weighed
 from tissuejax.errors import NotConverged
+from tissuejax.estimation.correlation import GAIN
 from tissuejax.estimation.discrepancy import Discrepancy
 
 Report = Callable[[str], None] | None
@@ -48,7 +55,43 @@ def explore(
     if report:
         report("fitting the base model")
     scales, base = based(bench, cut, of, criteria, effort, kept)
-    bench = scales.bench
+    e = searched(scales.bench, scales, base, criteria, effort, report, kept)
+    for _ in range(effort.readings):
+        if (noise := noise_beside(e)) is None:
+            break
+        best, scales = e.weighed[e.best], replace(scales, blocked=noise)
+        base = kept.weigh(scales, (), Start(base.refit.values), criteria, effort.course)
+        e = searched(scales.bench, scales, base, criteria, effort, report, kept)
+        e.noise_of = best
+    e.look_again()
+    return e
+
+
+def noise_beside(e: Exploration) -> Blocked | None:
+    """The noise that the best set's residual shows, where that set is the likelier for it by as much as correlated
+    noise has to beat white; None where there is no set, or nothing to gain."""
+    best, old = e.weighed[e.best], e.scales.blocked
+    if not e.best or e.bench.costly:
+        return None
+    e.tell("reading the noise again beside", best.evidence.keys)
+    noise = shown(old, e.bench, e.scales.cut, best.refit.prediction)
+    if noise.noise is None and old.noise is None:
+        return None
+    start = Start(best.begun, best.v, at=best.refit.values)
+    again = e.kept.weigh(replace(e.scales, blocked=noise), best.evidence.keys, start, e.criteria, e.effort.course)
+    return noise if again.evidence.log_evidence - best.evidence.log_evidence > GAIN / 2 else None
+
+
+def searched(
+    bench: Bench,
+    scales: Scales,
+    base: Weighed,
+    criteria: Criteria,
+    effort: Effort,
+    report: Report,
+    kept: Kept,
+) -> Exploration:
+    """The sets that are worth it, weighed under the noise of these scales."""
     e = alone(bench, scales, base, criteria, effort, report, kept)
     scales, disturbed = disrupted(scales, base, criteria, effort.course)
     if e.log_worth(disturbed) > e.worth(e.best):  # better than any single effect: all of them beside what happened
@@ -67,7 +110,6 @@ def explore(
         e.settle(size + 1)
         e.leave_out(e.best)
         e.settle(size)
-    e.look_again()
     return e
 
 
