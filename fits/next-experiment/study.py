@@ -1,8 +1,9 @@
 """Does the proposed experiment settle what the recordings leave open? Simulated from a truth by other code.
 
-Recordings are made that two explanations fit alike; the diagnosis says "ambiguous" and proposes a protocol; the
-protocol is simulated from the truth by the closed forms of the challenge, which share no code with the diagnosis, and
-the diagnosis runs again with that recording. As a control the first recording is made once more instead.
+Recordings of an effect that grows by factors of two, from one that noise hides. Where the answer leaves more than a
+tenth open the diagnosis proposes a protocol; that is simulated from the truth by the closed forms of the challenge,
+which share no code with the diagnosis, and the diagnosis runs again with that recording. As a control the first
+recording is made once more instead.
 
 tissuejax study fits/next-experiment
 """
@@ -19,7 +20,7 @@ from tissuejax.challenge.specimen import Trial
 from tissuejax.challenge.strain_laws import Body
 from tissuejax.recordings.recording import Channel, Recording, Sample
 from tissuejax.report.page import png
-from tissuejax.report.plot import FAINT, MODEL, grid
+from tissuejax.report.plot import SERIES, grid
 from tissuejax.storage import write_bytes, write_json
 
 BODY = Body({"10": 600.0, "20": 500.0})
@@ -63,80 +64,99 @@ PULLS = (
     trial("last", "uniaxial", [1.32], 1200.0),
 )
 CASES = {
-    "relaxation": Ingredient("viscoelasticity", "prony", 0.008, {"shares": [1.0], "tau": [4.0]}),
-    "draining": Ingredient("compressibility", "drained", 0.01, {"tau": 4.0}),
+    "relaxation": lambda share: Ingredient("viscoelasticity", "prony", share, {"shares": [1.0], "tau": [4.0]}),
+    "draining": lambda share: Ingredient("compressibility", "drained", share, {"tau": 4.0}),
 }
-DRAWS = 8  # of the noise
+SHARES = (0.01, 0.02, 0.04, 0.08, 0.16)  # of the stress that relaxes; the compressibility that drains
+DRAWS = 3  # of the noise, at each
 
 
-def told(found) -> dict:
+def told(found, truth: str) -> dict:
     """The verdict in brief."""
     record = found.as_dict()
+    named = [e["name"] for e in record["effects"]] if record["verdict"] != "ambiguous" else []
     return {
         "verdict": record["verdict"],
-        "effects": [e["name"] for e in record["effects"]],
-        "or": [a["effects"] for a in record["alternatives"]],
+        "named": named,
         "confidence": record["confidence"],
+        "truth": record["inclusion"].get(truth, 0.0),
     }
 
 
-def case(ingredient: Ingredient, seed: int) -> dict:
-    """One draw of the noise, from the recordings to the settled verdict, with the control."""
+def case(name: str, share: float, seed: int) -> dict:
+    """One draw of the noise, from the recordings to the verdict with what was proposed, and with the control."""
+    ingredient = CASES[name](share)
     specimen = Specimen(BODY, (ingredient,))
     rng = np.random.default_rng(seed)
     recordings = {t.name: recording(specimen, t, rng) for t in PULLS}
+
+    def asked(**more: Recording) -> dict:
+        return told(tj.diagnose(Sample("case", {**recordings, **more}), ENERGY, holdout="last"), ingredient.name)
+
     first = tj.diagnose(Sample("case", recordings), ENERGY, holdout="last")
-    out = {"truth": ingredient.name, "first": told(first), "proposals": [p.as_dict() for p in first.proposals]}
+    out = {
+        "share": share,
+        "truth": ingredient.name,
+        "first": told(first, ingredient.name),
+        "proposals": [p.as_dict() for p in first.proposals],
+    }
     if not first.proposals:
         return out
     best = first.proposals[0]
-    out["proposed"], out["discrimination"] = best.protocol, best.discrimination
-    done = carried_out(specimen, best.recording, "proposed", rng)
-    out["then"] = told(tj.diagnose(Sample("case", {**recordings, "proposed": done}), ENERGY, holdout="last"))
-    once_more = recording(specimen, replace(PULLS[0], name="again", start=1800.0), rng)
-    out["control"] = told(tj.diagnose(Sample("case", {**recordings, "again": once_more}), ENERGY, holdout="last"))
+    out |= {"proposed": best.protocol, "discrimination": best.discrimination}
+    out["then"] = asked(proposed=carried_out(specimen, best.recording, "proposed", rng))
+    out["control"] = asked(again=recording(specimen, replace(PULLS[0], name="again", start=1800.0), rng))
     return out
 
 
-def settled(record: dict, step: str) -> bool:
-    """Whether a step ended with the truth and nothing else."""
-    return record[step]["verdict"] == "found" and record[step]["effects"] == [record["truth"]]
+def right(record: dict, step: str) -> bool:
+    """Whether the truth is named at a step, and nothing else."""
+    return record[step]["named"] == [record["truth"]]
+
+
+def wrong(record: dict, step: str) -> bool:
+    """Whether something else is named."""
+    return bool(set(record[step]["named"]) - {record["truth"]})
 
 
 def picture(records: dict) -> bytes:
-    """Confidence in the truth alone: before, after a repeat, after the proposed protocol."""
+    """Probability of the truth: before, after a repeat, after the proposed protocol."""
     figure, axes = grid(len(records), columns=2, height=3.0)
     steps = ("first", "control", "then")
     for ax, (name, cases) in zip(axes, records.items(), strict=True):
-        for c in cases:
-            if "then" in c:
-                right = [c[s]["confidence"] if c[s]["effects"][:1] == [c["truth"]] else 0.0 for s in steps]
-                ax.plot(range(3), right, "o-", color=MODEL if settled(c, "then") else FAINT, alpha=0.6)
+        for colour, share in zip(SERIES, SHARES, strict=False):
+            for k, c in enumerate(c for c in cases if c["share"] == share and "then" in c):
+                label = f"{share:.0%}" if k == 0 else None
+                ax.plot(range(3), [c[s]["truth"] for s in steps], "o-", color=colour, alpha=0.7, label=label)
         ax.set_xticks(range(3), ["three pulls", "a pull again", "what was proposed"])
-        ax.set(title=f"truth: {name}", ylabel="confidence in the truth", ylim=(-0.05, 1.05))
+        ax.set(title=f"truth: {name}", ylabel="probability of the truth", ylim=(-0.05, 1.05))
+        if ax.lines:
+            ax.legend(fontsize=7, frameon=False)
     return png(figure)
 
 
 def main(folder: Path) -> str:
     """All cases and draws; returns the answer in a sentence."""
-    records = {n: [case(c, seed) for seed in range(1, DRAWS + 1)] for n, c in CASES.items()}
-    summary = {}
+    records = {n: [case(n, s, seed) for s in SHARES for seed in range(1, DRAWS + 1)] for n in CASES}
+    rows = []
     for name, cases in records.items():
-        open_ = [c for c in cases if c["first"]["verdict"] == "ambiguous" and "then" in c]
-        summary[name] = {
-            "draws": len(cases),
-            "ambiguous_at_first": len(open_),
-            "settled_by_the_proposal": sum(settled(c, "then") for c in open_),
-            "settled_by_a_repeat": sum(settled(c, "control") for c in open_),
-            "proposed": sorted({c["proposed"] for c in open_}),
-            "wrong_at_first": sum(c["first"]["verdict"] == "found" and not settled(c, "first") for c in cases),
-        }
-    write_json(folder / "result.json", {"summary": summary, "cases": records})
+        for share in SHARES:
+            of = [c for c in cases if c["share"] == share]
+            open_ = [c for c in of if "then" in c]
+            rows.append(
+                {"truth": name, "share": share, "draws": len(of), "named at once": sum(right(c, "first") for c in of)}
+                | {"proposed": len(open_)}
+                | {f"right {step}": sum(right(c, step) for c in open_) for step in ("first", "control", "then")}
+                | {f"wrong {step}": sum(wrong(c, step) for c in open_) for step in ("first", "control", "then")}
+                | {"what": sorted({c["proposed"] for c in open_})}
+            )
+    write_json(folder / "result.json", {"rows": rows, "cases": records})
     write_bytes(folder / "figures" / "confidence.png", picture(records))
-    return "; ".join(
-        f"{n}: {s['ambiguous_at_first']} of {s['draws']} ambiguous, {s['settled_by_the_proposal']} settled by what was "
-        f"proposed ({', '.join(s['proposed'])}), {s['settled_by_a_repeat']} by a repeat"
-        for n, s in summary.items()
+    whole = {k: sum(r[k] for r in rows) for k in rows[0] if k not in ("truth", "share", "what")}
+    return (
+        f"of {whole['draws']} samples {whole['proposed']} left something open; right of these before "
+        f"{whole['right first']}, with a pull again {whole['right control']}, with what was proposed "
+        f"{whole['right then']} (wrong names {whole['wrong first']}, {whole['wrong control']}, {whole['wrong then']})"
     )
 
 

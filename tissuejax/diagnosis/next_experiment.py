@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.material import MaterialBench
 from tissuejax.diagnosis.refit import Refit
 from tissuejax.energies.energy import Energy
@@ -151,7 +152,7 @@ def proposals(
         made, energy, tuple(made.recordings), (), dict.fromkeys(made.recordings, sigma), sizes=bench.sizes
     )
     trial.known = bench.known
-    names = [", ".join(dict.fromkeys(bench.candidates[k].name for k in r.keys)) for r in (chosen, rival)]
+    names = [called(bench, r) for r in (chosen, rival)]
     both = [trial.predict(shared(r)) for r in (chosen, rival)]
     old = [bench.jacobian(r.values, tuple(r.values), bench.fitted)[bench.mask(bench.fitted)] for r in (chosen, rival)]
     scale = bench.sigma[bench.mask(bench.fitted)][:, None]
@@ -165,6 +166,11 @@ def proposals(
         sides = [against(d, o / scale, n[s.rows] / sigma) for o, n in zip(old, new, strict=True)]
         out.append(Proposal(text, (names[0], names[1]), min(sides), planned[text]))
     return sorted(out, key=lambda p: -p.discrimination)[:most]
+
+
+def called(bench: Bench, r: Refit) -> str:
+    """The effects of a fit, in words."""
+    return ", ".join(dict.fromkeys(bench.candidates[k].name for k in r.keys)) or "nothing that has a name"
 
 
 def settling(each: list[list[Proposal]], most: int = 3) -> list[Proposal]:

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from tissuejax.diagnosis.next_experiment import Proposal, shared
+from tissuejax.diagnosis.next_experiment import Proposal, called, shared
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_added import added
 from tissuejax.diagnosis.probing_runs import COARSE, FINE, Runs
@@ -82,23 +82,23 @@ def probing_proposals(
     planned = Sample(
         f"{sample.name} next", {r.name: r for r in words.values()}, sample.geometry, sample.density, sample.gravity
     )
-    settings, names = bench.runs.ready[COARSE].settings, tuple(planned.recordings)
+    settings, pressed = bench.runs.ready[COARSE].settings, tuple(planned.recordings)
     try:
-        ready = ProbingPredictor.prepare(bench.model, planned, names, settings)
+        ready = ProbingPredictor.prepare(bench.model, planned, pressed, settings)
     except InputError:  # a varied path that the body doesn't allow must not cost the verdict
         return []
     segments, y, sigma = series(planned, ready)
     runs = Runs({FINE: ready, COARSE: ready}, bench.runs.effects, segments, y, kept_samples(planned, segments))
     both = [bench.at(shared(r)) for r in (chosen, rival)]
-    simulated = runs.many([(at, names, FINE) for at in both])
+    simulated = runs.many([(at, pressed, FINE) for at in both])
     predicted = [y + added(runs, at) for y, at in zip(simulated, both, strict=True)]
-    keys = [", ".join(dict.fromkeys(bench.candidates[k].name for k in r.keys)) for r in (chosen, rival)]
+    names = [called(bench, r) for r in (chosen, rival)]
     out = []
     for text, r in words.items():
         own = [s for s in segments if s.recording == r.name]
         both = [told_apart(predicted, own, sigma, i) for i in (0, 1)]
         if np.all(np.isfinite(both)):
-            out.append(Proposal(text, (keys[0], keys[1]), min(both), r))
+            out.append(Proposal(text, (names[0], names[1]), min(both), r))
     return sorted(out, key=lambda p: -p.discrimination)[:most]
 
 

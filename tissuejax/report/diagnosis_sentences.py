@@ -21,6 +21,8 @@ def next_steps(d: Diagnosis) -> list[str]:
     kind = d.verdict.kind
     if not d.search.bench.held_out:
         return ["Record once more, in another way, and hold that recording out: nothing guards this verdict yet."]
+    if kind == "ambiguous" or d.verdict.rivals:
+        return ["No variation of these protocols tells the explanations apart well; another kind of test is needed."]
     if kind == "nothing-missing":
         return [
             "Nothing is asked for by these recordings. What they are blind to (other rates, directions, kinds of test) "
@@ -31,8 +33,6 @@ def next_steps(d: Diagnosis) -> list[str]:
             "No further recording is needed to tell the candidates apart. A second specimen, with the effects held at "
             "these values and only the base refitted, would show whether they belong to the material."
         ]
-    if kind == "ambiguous":
-        return ["No variation of these protocols tells the explanations apart well; another kind of test is needed."]
     return [
         "Look at the remainder below (remainder.json): what it is a function of (drive, rate, time, place) says which "
         "recording to make next, one where that varies alone. A new effect is one file: see docs/new-effect.md."

@@ -20,7 +20,7 @@ from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.explore import Exploration
-from tissuejax.diagnosis.judgement.judge import Judgement, Kind, covering, judge
+from tissuejax.diagnosis.judgement.judge import Judgement, Kind, judge, undecided
 from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.rest import level
 from tissuejax.diagnosis.judgement.search import explore
@@ -79,11 +79,8 @@ class Answered:
 
     @property
     def rivals(self) -> tuple[Refit, ...]:
-        """Sets that these data can't tell from the chosen one."""
-        if self.judgement.kind is not Kind.AMBIGUOUS:
-            return ()
-        offers = (frozenset(s.keys) for s, _ in covering(self.judgement, self.exploration.criteria))
-        return tuple(self.refits[k] for k in offers if k in self.refits)
+        """What a further recording would have to decide between, beside the chosen set; see `open_sets`."""
+        return tuple(self.refits[frozenset(k)] for k in open_sets(self.judgement, self.exploration))
 
     @property
     def misfit(self) -> Misfit:
@@ -188,12 +185,17 @@ def answer(
     shown = copy.copy(bench)
     shown.candidates = {k: replace(c, held=()) for k, c in bench.candidates.items()}
     out = Answered(shown, found, evidence, judgement)
-    keys = [(), judgement.chosen.keys]
-    if judgement.kind is Kind.AMBIGUOUS:
-        keys += [s.keys for s, _ in covering(judgement, criteria)[: found.effort.rivals]]
-    for k in dict.fromkeys(tuple(k) for k in keys):
+    for k in dict.fromkeys(((), tuple(judgement.chosen.keys), *open_sets(judgement, found))):
         shown_fit(out, k)
     return out
+
+
+def open_sets(judgement: Judgement, found: Exploration) -> tuple[tuple[str, ...], ...]:
+    """The sets that a further recording would have to decide between, beside the chosen one, as many as get a fit of
+    their own; where every prediction is a simulation, only if the answer is that they can't be told apart."""
+    if found.bench.costly and judgement.kind is not Kind.AMBIGUOUS:
+        return ()
+    return undecided(judgement, found.criteria)[: found.effort.rivals]
 
 
 def shown_fit(out: Answered, keys: tuple[str, ...]) -> Refit:

@@ -231,6 +231,33 @@ def covering(judgement: Judgement, criteria: Criteria | None = None) -> tuple[tu
     return tuple(out)
 
 
+def undecided(judgement: Judgement, criteria: Criteria | None = None) -> tuple[tuple[str, ...], ...]:
+    """What a further recording would have to decide between, beside the chosen set: sets by their candidates, most
+    probable first, none for the base alone.
+
+    Of all accounts that say what would be recorded next those that, with the chosen one, cover `Criteria.covered` of
+    their probability: sets that have a name, and the base where it leaves nothing of note (what something without a
+    name would do nobody knows). None where all of these together are as improbable as what is not covered.
+    """
+    criteria = criteria or Criteria()
+    chances, base = judgement.probabilities, judgement.posterior.get("", 0.0)
+    accounts: list[tuple[float, tuple[str, ...]]] = [(p, s.keys) for s, p in judgement.alternatives]
+    total = sum(judgement.posterior.values())
+    if chances[Kind.NOTHING] <= chances[Kind.UNEXPLAINED]:
+        total -= base
+    elif judgement.chosen.names:
+        accounts.append((base, ()))
+    if total <= 1 - criteria.covered:
+        return ()
+    at, out = judgement.posterior.get(" + ".join(sorted(judgement.chosen.names)), 0.0), []
+    for p, keys in sorted(accounts, key=lambda a: -a[0]):
+        if at >= criteria.covered * total:
+            break
+        out.append(keys)
+        at += p
+    return tuple(out)
+
+
 def entropy(judgement: Judgement) -> float:
     """How undecided the posterior over sets is, nats."""
     p = np.array(list(judgement.posterior.values()))

@@ -49,7 +49,7 @@ class MaterialTests(Recorded):
     def finished(self, found: Answered) -> Diagnosis:
         """See `Recorded.finished`; what the fitted recordings leave open in the others is said too."""
         q = self.question
-        planned = (proposals(q.sample, q.energy, found.bench, found.chosen, r, None) for r in found.rivals[:3])
+        planned = (proposals(q.sample, q.energy, found.bench, found.chosen, r, None) for r in found.rivals)
         open_ends = []
         if found.kind != Kind.UNEXPLAINED:
             keys = frozenset(found.chosen.keys)
