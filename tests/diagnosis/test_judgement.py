@@ -7,27 +7,15 @@ import math
 import numpy as np
 import pytest
 from scipy.stats import halfnorm, multivariate_normal
+from weighed_sets import evidence, weighed
 
 from tissuejax.diagnosis.judgement.criteria import Criteria
-from tissuejax.diagnosis.judgement.evidence import Evidence, SetEvidence, read_evidence, write_evidence
-from tissuejax.diagnosis.judgement.judge import Beforehand, Kind, judge, undecided
+from tissuejax.diagnosis.judgement.evidence import read_evidence, write_evidence
+from tissuejax.diagnosis.judgement.judge import Beforehand, Kind, judge
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, amplitudes, marginal
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
 from tissuejax.estimation.discrepancy import Part, Series, discrepancy, loading_states
 from tissuejax.estimation.smoothness import USUAL
-
-FORMS = {"relaxation": 2, "slack": 1, "drift": 3}
-
-
-def weighed(names, log_evidence, rest=1e-8, void=False, chi2=1e9):
-    keys = tuple(names)
-    numbers = {"fit": 0.0, "parameters": 0.0, "discrepancy": 0.0, "amplitudes": {}, "k": 2, "at_bound": ()}
-    more = {"chi2": chi2, "n": 100, "kurtosis": 0.0, "explained": 0.5, "rest": (rest, 1e-2 * rest)}
-    return SetEvidence(keys, keys, log_evidence, void=void, **numbers, **more)
-
-
-def evidence(*sets):
-    return Evidence(tuple(sets), FORMS, ("r1", "r2"), ("r3",))
 
 
 @pytest.mark.parametrize("seed", range(30))
@@ -129,44 +117,6 @@ def test_a_name_that_two_sets_share_is_found_though_neither_set_is_sure():
     assert j.inclusion["slack"] == pytest.approx(0.5, abs=1e-6)
     assert j.kind in (Kind.FOUND, Kind.IN_PART)
     assert "relaxation" in j.names
-
-
-@pytest.mark.parametrize(
-    ("base", "slack", "drift", "still_open"),
-    [
-        (0.0, 30.0, -9.0, []),
-        (0.0, 2.0, -9.0, [()]),
-        (0.0, 4.0, 4.0, [("drift",)]),
-        (3.0, 4.0, 4.0, [(), ("drift",)]),
-        (-9.0, 4.0, 4.0, [("drift",)]),
-        (4.0, 2.0, -9.0, []),
-    ],
-)
-def test_a_further_recording_has_to_decide_between_what_covers_nine_tenths(base, slack, drift, still_open):
-    """Odds of the base, of slack (a third of the prior of one effect) and of one form in three of drift (a ninth) are
-    e^base, e^slack / 3 and e^drift / 9: 1 to 2.5 leaves the base open, 1 to 18 to 6 the base not, 20 to 18 to 6 all."""
-    sets = (weighed([], base), weighed(["slack"], slack), weighed(["drift"], drift))
-    j = judge(evidence(*sets), Criteria(coarse=1e12))
-    odds = {(): math.exp(base), ("slack",): math.exp(slack) / 3, ("drift",): math.exp(drift) / 9}
-    whole = sum(odds.values())
-    assert list(undecided(j)) == still_open
-    assert sum(odds[k] for k in (j.chosen.keys, *still_open)) >= 0.9 * whole
-    assert sum(odds[k] for k in (j.chosen.keys, *still_open[:-1])) < 0.9 * whole or not still_open
-
-
-@pytest.mark.parametrize(("rest", "still_open"), [(1e-8, [(), ("drift",)]), (1e-3, [("drift",)])])
-def test_a_base_that_leaves_something_of_note_predicts_nothing_and_is_not_asked_about(rest, still_open):
-    sets = (weighed([], 3.0, rest), weighed(["slack"], 4.0), weighed(["drift"], 4.5))
-    assert list(undecided(judge(evidence(*sets), Criteria(coarse=1e12)))) == still_open
-
-
-@pytest.mark.parametrize(("base", "still_open"), [(4.5, [("drift",)]), (6.0, [])])
-def test_names_that_are_improbable_together_are_not_asked_about(base, still_open):
-    """Odds of the base are 90 and 403 to 18 and 6 of the names: 24 of 114, and 24 of 427, less than a tenth."""
-    sets = (weighed([], base, 1e-3), weighed(["slack"], 4.0), weighed(["drift"], 4.0))
-    j = judge(evidence(*sets), Criteria(coarse=1e12))
-    assert j.kind is Kind.UNEXPLAINED
-    assert list(undecided(j)) == still_open
 
 
 def test_an_effect_that_rests_at_neutral_does_not_count():
