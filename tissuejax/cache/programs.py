@@ -28,6 +28,8 @@ ENVIRONMENT = "TISSUEJAX_CACHE"
 WORTHWHILE = 0.3  # s of compilation from which a program is kept
 TRACED = "traced"  # subfolder of what tracing gave
 MARK = 32  # bytes of a hash
+# XLA's newer fusion emitters take twice as long to compile algebra over a thousand samples, and run it no faster
+QUICKLY = {"xla_cpu_use_fusion_emitters": False}
 _all: weakref.WeakSet["Kept"] = weakref.WeakSet()
 MOST = 1000  # files kept there, of a tenth of a megabyte each
 
@@ -135,7 +137,9 @@ class Kept:
                 promised = self._known[key] = Future()
         if mine:
             try:
-                promised.set_result(jax.jit(self._traced(key, leaves)).lower(*leaves).compile())
+                promised.set_result(
+                    jax.jit(self._traced(key, leaves), compiler_options=QUICKLY).lower(*leaves).compile()
+                )
             except BaseException as error:
                 self._known.pop(key, None)
                 promised.set_exception(error)

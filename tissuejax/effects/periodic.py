@@ -70,6 +70,6 @@ class Periodic(Effect):
         self, p: Mapping[str, Array], test: MaterialTest, stress: Float[Array, "n ..."]
     ) -> Float[Array, "n ..."]:
         angle = 2 * jnp.pi * p["frequency"] * (test.elapsed if self.separate else test.start + test.elapsed)
-        load = p["sin"] * jnp.sin(angle) + p["cos"] * jnp.cos(angle)
-        load = load + p["sin2"] * jnp.sin(2 * angle) + p["cos2"] * jnp.cos(2 * angle)
+        s, c = jnp.sin(angle), jnp.cos(angle)
+        load = p["sin"] * s + p["cos"] * c + p["sin2"] * 2 * s * c + p["cos2"] * (1 - 2 * s * s)
         return stress + (load if stress.ndim == 1 else load[:, None])

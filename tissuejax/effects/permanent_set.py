@@ -59,7 +59,9 @@ class PermanentSet(Effect):
         m = jnp.where(jnp.abs(m) < 1e-3, 1e-3, m)  # the logarithm to a thousandth
         shear = test.mode == "shear"
         strain = drive if shear else (drive**m - 1) / m
-        extremes = running_peak(jnp.maximum(strain - least, 0.0)) - running_peak(jnp.maximum(-strain - least, 0.0))
+        both = jnp.stack([strain - least, -strain - least], axis=-1)
+        pulled, pushed = jnp.moveaxis(running_peak(jnp.maximum(both, 0.0)), -1, 0)
+        extremes = pulled - pushed
         if shear:
             return drive - p["amount"] * extremes
         kept = -m * p["amount"] * extremes * drive**-m

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -63,10 +64,15 @@ class Slack(Effect):
         drive = self.loaded(p["preload"], test, drive)
         strain = drive - test.rest
         # Subtracted from the drive, not added to rest, so that no gap changes no bit.
-        size, gap, round_ = jnp.abs(strain), p["gap"], p["roundness"] > 0
-        power = 1 / jnp.where(round_, p["roundness"], 1.0)
-        far = jnp.minimum((jnp.maximum(size, 1e-12) / jnp.maximum(gap, 1e-12)) ** power, 50.0)
-        lost = jnp.where(round_, gap * (-jnp.expm1(-far)) ** (1 / power), jnp.minimum(size, gap))
+        size, gap = jnp.abs(strain), p["gap"]
+
+        def rounded(roundness: Array) -> Array:
+            power = 1 / roundness
+            far = jnp.minimum((jnp.maximum(size, 1e-12) / jnp.maximum(gap, 1e-12)) ** power, 50.0)
+            return gap * (-jnp.expm1(-far)) ** (1 / power)
+
+        # powers cost as much as all the rest of a prediction, and few slacks are rounded
+        lost = jax.lax.cond(p["roundness"] > 0, rounded, lambda _: jnp.minimum(size, gap), p["roundness"])
         return drive - jnp.sign(strain) * lost
 
     @staticmethod
