@@ -21,7 +21,7 @@ CURRENT = {
     "material": ("material", "material-second", "material-third", "material-fourth", "material-fifth",
                  "material-sixth", "material-seventh", "material-eighth", "material-ninth",
                  "material-tenth", "material-eleventh", "material-twelfth", "material-thirteenth",
-                 "material-fourteenth", "material-fifteenth"),
+                 "material-fourteenth", "material-fifteenth", "material-sixteenth"),
     "probing": ("probing", "probing-strong", "probing-strong-second", "probing-pairs", "probing-second",
                 "probing-strong-third", "probing-third", "probing-fourth", "probing-fifth", "probing-sixth",
                 "probing-seventh"),
@@ -29,7 +29,7 @@ CURRENT = {
 
 
 NEWEST = {
-    "material tests": ("material-thirteenth", "material-fourteenth", "material-fifteenth"),
+    "material tests": ("material-thirteenth", "material-fourteenth", "material-fifteenth", "material-sixteenth"),
     "beside a rest": ("rest-seventh",),
     "probings": ("probing-seventh",),
     "probings beside a rest": ("probing-rest",),
