@@ -68,7 +68,7 @@ CASES = {
     "draining": lambda share: Ingredient("compressibility", "drained", share, {"tau": 4.0}),
 }
 SHARES = (0.01, 0.02, 0.04, 0.08, 0.16)  # of the stress that relaxes; the compressibility that drains
-DRAWS = 3  # of the noise, at each
+SEEDS = (11, 12, 13)  # of the noise, at each; 1 to 3 were seen while the order of proposals was made
 
 
 def told(found, truth: str) -> dict:
@@ -137,7 +137,7 @@ def picture(records: dict) -> bytes:
 
 def main(folder: Path) -> str:
     """All cases and draws; returns the answer in a sentence."""
-    records = {n: [case(n, s, seed) for s in SHARES for seed in range(1, DRAWS + 1)] for n in CASES}
+    records = {n: [case(n, s, seed) for s in SHARES for seed in SEEDS] for n in CASES}
     rows = []
     for name, cases in records.items():
         for share in SHARES:

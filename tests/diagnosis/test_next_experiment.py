@@ -11,7 +11,7 @@ from tissuejax.diagnosis.diagnose import diagnose
 from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.material import MaterialBench
 from tissuejax.diagnosis.misfit import white
-from tissuejax.diagnosis.next_experiment import Proposal, against, proposals, protocols, settling
+from tissuejax.diagnosis.next_experiment import Proposal, against, leftover, proposals, protocols, settling
 from tissuejax.diagnosis.refit import refit
 from tissuejax.energies.catalogue import energy
 from tissuejax.recordings.recording import Channel, Recording, Sample
@@ -38,6 +38,33 @@ def test_a_protocol_has_to_tell_the_chosen_one_from_every_rival():
     assert [(p.protocol, p.discrimination) for p in found] == [("faster", 20.0), ("hold", 1.0)]
     assert found[0].between == ("a", "b or c")
     assert settling([]) == []
+
+
+def test_of_protocols_that_settle_it_another_kind_of_test_comes_first():
+    def made(text, kind, size):
+        return Proposal(text, ("a", "b"), size, Recording(text, kind, {}, {}))
+
+    each = [[made("faster", "uniaxial", 90.0), made("planar", "planar", 40.0), made("biaxial", "equibiaxial", 20.0)]]
+    assert [p.protocol for p in settling(each, done={"uniaxial"})] == ["planar", "faster", "biaxial"]
+    assert [p.protocol for p in settling(each, done={"uniaxial", "planar"})] == ["faster", "planar", "biaxial"]
+
+
+def test_what_any_law_leaves_is_absorbed_at_the_price_of_its_prior():
+    """Of a difference of size a along a column of size c the least of (a - c z)^2 + z^2 is a^2 / (1 + c^2)."""
+    n = 40
+    column = np.ones((n, 1)) / np.sqrt(n)
+    a, c = 5.0, 3.0
+    nothing = np.zeros((n, 1))
+    assert against(a * column[:, 0], nothing, nothing, c * column) == pytest.approx(a**2 / (1 + c**2))
+    assert against(a * column[:, 0], nothing, nothing) == pytest.approx(a**2)
+
+
+def test_what_any_law_leaves_has_the_size_of_its_shares():
+    """Legendre polynomials over sqrt(5) have 1/5 of a mean square of 1, 1/3, 1/5, 1/7 and 1/9 on an even grid."""
+    drive, stress = np.linspace(1, 1.4, 40001), np.full(40001, 200.0)
+    left = leftover(drive, np.arange(40001.0), stress, {"law": 0.015, "slow": 0.01})
+    expected = np.sqrt(np.tile([1, 1 / 3, 1 / 5, 1 / 7, 1 / 9], 2) / 5) * np.repeat([3.0, 2.0], 5)
+    assert np.sqrt(np.mean(left**2, axis=0)) == pytest.approx(expected, rel=1e-3)
 
 
 MU, K1 = 900.0, 300.0

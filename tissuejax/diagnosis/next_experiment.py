@@ -6,14 +6,20 @@ everything B may adjust, old recordings included. What B can't absorb,
     D = min over x of |d - J x|^2,
 
 is the chi-square that would speak against B if A were true: the discrimination of Hunter and Reiner (1965), as used for
-nonlinear models by Box and Hill (1967). Protocols are variations of what was done: a hold, ten times faster or slower,
-further, the other sign, cycles, another kind of test, another direction, a day later.
+nonlinear models by Box and Hill (1967). What any law leaves in a new recording too, smooth in strain and in time and of
+its prior's size, is absorbed at that price. Protocols are variations of what was done: a hold, ten times faster or
+slower, further, the other sign, cycles, another kind of test, another direction, a day later.
+
+Of several that would settle it those of another kind of test come first: they show as well what the kinds of test that
+were made are blind to, which is among no explanation that is left.
 """
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
+from numpy.polynomial.legendre import legvander
 
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.material import MaterialBench
@@ -22,6 +28,8 @@ from tissuejax.energies.energy import Energy
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 SAMPLES = 500
+SETTLES, HELPS = 30.0, 8.0  # chi-square: odds that no prior outweighs; that count as strong
+BENDS = 4  # degree up to which what any law leaves is smooth in strain, and in time
 
 
 @dataclass(frozen=True)
@@ -45,9 +53,9 @@ class Proposal:
         a, b = self.between
         strong = (
             "would settle it"
-            if self.discrimination > 30
+            if self.discrimination > SETTLES
             else "would help"
-            if self.discrimination > 8
+            if self.discrimination > HELPS
             else "would hardly help"
         )
         return {
@@ -135,13 +143,20 @@ def protocols(sample: Sample) -> dict[str, Recording]:
 
 
 def proposals(
-    sample: Sample, energy: Energy, bench: MaterialBench, chosen: Refit, rival: Refit, most: int | None = 3
+    sample: Sample,
+    energy: Energy,
+    bench: MaterialBench,
+    chosen: Refit,
+    rival: Refit,
+    most: int | None = 3,
+    shares: Mapping[str, float] | None = None,
 ) -> list[Proposal]:
     """The protocols that tell `chosen` from `rival` best (all of them for None).
 
     Args:
         sample: what was recorded, to vary.
         bench: on which both were fitted.
+        shares: of the stress that any law leaves ("law", "slow"; `Criteria.shares`); nothing by default.
     """
     planned = protocols(sample)
     if not planned:
@@ -163,7 +178,8 @@ def proposals(
         d = (both[0] - both[1])[s.rows] / sigma
         if not np.all(np.isfinite(d)):
             continue
-        sides = [against(d, o / scale, n[s.rows] / sigma) for o, n in zip(old, new, strict=True)]
+        left = leftover(s.drive, s.time, both[0][s.rows], shares or {}) / sigma
+        sides = [against(d, o / scale, n[s.rows] / sigma, left) for o, n in zip(old, new, strict=True)]
         out.append(Proposal(text, (names[0], names[1]), min(sides), planned[text]))
     return sorted(out, key=lambda p: -p.discrimination)[:most]
 
@@ -173,8 +189,23 @@ def called(bench: Bench, r: Refit) -> str:
     return ", ".join(dict.fromkeys(bench.candidates[k].name for k in r.keys)) or "nothing that has a name"
 
 
-def settling(each: list[list[Proposal]], most: int = 3) -> list[Proposal]:
-    """Of the proposals against each rival, the protocols that tell the chosen explanation from all of them best."""
+def leftover(
+    drive: Float[np.ndarray, " n"], time: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n"], shares: Mapping
+) -> Float[np.ndarray, "n k"]:
+    """What any law leaves beside a prediction, Pa, in columns of weight one: a share of the stress that bends with the
+    drive, and a share of its peak that bends with time."""
+
+    def bends(x: np.ndarray) -> np.ndarray:
+        return legvander(2 * (x - x.min()) / (float(np.ptp(x)) or 1.0) - 1, BENDS) / np.sqrt(BENDS + 1)
+
+    peak = float(np.max(np.abs(stress)))
+    both = (shares.get("law", 0.0) * stress[:, None] * bends(drive), shares.get("slow", 0.0) * peak * bends(time))
+    return np.concatenate(both, axis=1)
+
+
+def settling(each: list[list[Proposal]], most: int = 3, done: Collection[str] = ()) -> list[Proposal]:
+    """Of the proposals against each rival, the protocols that tell the chosen explanation from all of them best; of
+    those that would settle it those first that are none of the kinds of test `done`."""
     if not each:
         return []
     out = []
@@ -183,15 +214,32 @@ def settling(each: list[list[Proposal]], most: int = 3) -> list[Proposal]:
         if all(same):
             rivals = " or ".join(dict.fromkeys(q.between[1] for q in same))
             out.append(replace(p, between=(p.between[0], rivals), discrimination=min(q.discrimination for q in same)))
-    return sorted(out, key=lambda p: -p.discrimination)[:most]
+
+    def rank(p: Proposal) -> tuple[bool, float]:
+        other = bool(done) and p.discrimination > SETTLES and p.recording.experiment not in done
+        return not other, -p.discrimination
+
+    return sorted(out, key=rank)[:most]
 
 
-def against(d: Float[np.ndarray, " n"], old: Float[np.ndarray, "m k"], new: Float[np.ndarray, "n k"]) -> float:
-    """What is left of d after every adjustment that the old recordings leave open."""
-    whole = np.concatenate([old, new])
+def against(
+    d: Float[np.ndarray, " n"],
+    old: Float[np.ndarray, "m k"],
+    new: Float[np.ndarray, "n k"],
+    left_over: Float[np.ndarray, "n j"] | None = None,
+) -> float:
+    """What is left of d after every adjustment that the old recordings leave open, and after what any law leaves.
+
+    Args:
+        d: difference of predictions; old, new: sensitivities of the old and the new recordings; all over noise.
+        left_over: what any law leaves, over noise: its columns are taken with any weight, at the price of its square.
+    """
+    loose = np.zeros((len(d), 0)) if left_over is None else left_over
+    j = loose.shape[1]
+    whole = np.block([[old, np.zeros((len(old), j))], [new, loose], [np.zeros((j, old.shape[1])), np.eye(j)]])
     norms = np.linalg.norm(whole, axis=0)
     whole = whole[:, norms > 0] / norms[norms > 0]
-    right = np.concatenate([np.zeros(len(old)), d])
+    right = np.concatenate([np.zeros(len(old)), d, np.zeros(j)])
     left = right - whole @ np.linalg.lstsq(whole, right, rcond=None)[0]
     return float(left @ left)
 

@@ -49,13 +49,14 @@ class MaterialTests(Recorded):
     def finished(self, found: Answered) -> Diagnosis:
         """See `Recorded.finished`; what the fitted recordings leave open in the others is said too."""
         q = self.question
-        planned = (proposals(q.sample, q.energy, found.bench, found.chosen, r, None) for r in found.rivals)
+        shares, kinds = q.criteria.shares, {r.experiment for r in q.sample.recordings.values()}
+        planned = (proposals(q.sample, q.energy, found.bench, found.chosen, r, None, shares) for r in found.rivals)
         open_ends = []
         if found.kind != Kind.UNEXPLAINED:
             keys = frozenset(found.chosen.keys)
             open_ends = foreseen(found.bench, found.whitenings[keys], found.plain[keys])
             found.bench.warnings += [x.sentence(found.chosen) for x in open_ends if x.over_noise > OPEN]
-        return Diagnosis(q.sample.name, q.label, found, 0.0, settling(list(planned)), [], open_ends)
+        return Diagnosis(q.sample.name, q.label, found, 0.0, settling(list(planned), done=kinds), [], open_ends)
 
     def predicted(self, whole: Sample, names: Sequence[str], found: Answered) -> dict[str, dict[str, float]]:
         """See `Recorded.predicted`: by parameters alone, those of a recording's own at neutral; Pa."""
