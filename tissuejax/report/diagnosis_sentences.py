@@ -16,9 +16,16 @@ def names_of(d: Diagnosis) -> list[str]:
 
 def next_steps(d: Diagnosis) -> list[str]:
     """What to measure next."""
-    if d.proposals:
-        return [p.as_dict()["sentence"] for p in d.proposals]
-    kind = d.verdict.kind
+    planned, kind = [p.as_dict()["sentence"] for p in d.proposals], d.verdict.kind
+    if kind == "unexplained":
+        look = (
+            "Look at the remainder below (remainder.json): what it is a function of (drive, rate, time, place) says "
+            "which recording to make next, one where that varies alone. A new effect is one file: see "
+            "docs/new-effect.md."
+        )
+        return [*planned, look]
+    if planned:
+        return planned
     if not d.search.bench.held_out:
         return ["Record once more, in another way, and hold that recording out: nothing guards this verdict yet."]
     if kind == "ambiguous" or d.verdict.rivals:
@@ -28,14 +35,9 @@ def next_steps(d: Diagnosis) -> list[str]:
             "Nothing is asked for by these recordings. What they are blind to (other rates, directions, kinds of test) "
             "they can't speak of; a recording unlike these, held out, is the next test of the model."
         ]
-    if kind in ("found", "found-in-part"):
-        return [
-            "No further recording is needed to tell the candidates apart. A second specimen, with the effects held at "
-            "these values and only the base refitted, would show whether they belong to the material."
-        ]
     return [
-        "Look at the remainder below (remainder.json): what it is a function of (drive, rate, time, place) says which "
-        "recording to make next, one where that varies alone. A new effect is one file: see docs/new-effect.md."
+        "No further recording is needed to tell the candidates apart. A second specimen, with the effects held at "
+        "these values and only the base refitted, would show whether they belong to the material."
     ]
 
 
