@@ -57,7 +57,7 @@ class Effort:
             brings back less.
         promised: times the gain of a linear step that a set may gain, where predictions are costly. Ground: fits gained
             0.1 to 0.9 of it where it was 30 nats and more (p02).
-        readings: times that noise is read again from what the best set leaves. Ground: cost; a third changes little.
+        readings: times that noise is read again from what the best set leaves. Ground: cost, each is a search more.
         again: sets weighed anew where something may have happened at once. Ground: cost.
         stepwise: a second effect is sought only where a first one has come in.
         shown: steps of a fit that is shown. Ground: fits end by themselves before.
