@@ -13,7 +13,7 @@ from tissuejax.diagnosis.judgement.marginal import Widths, amplitudes, marginal
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
 from tissuejax.diagnosis.judgement.sudden import gains
 from tissuejax.estimation.discrepancy import Part
-from tissuejax.estimation.sudden import Timed
+from tissuejax.estimation.sudden import Disturbed, Timed
 from tissuejax.recordings.recording import Channel, Recording, Sample
 from tissuejax.report.judged_sentences import sure
 
@@ -53,27 +53,81 @@ def test_the_mass_of_a_part_that_is_nothing_or_a_thousand_times_as_wide_is_its_i
     assert amplitude_mass(linear, part, priors, blocked, v, m) == pytest.approx(exact, abs=0.05)
 
 
+def moment_of(time, owner, start, name, strain=None):
+    names = tuple(f"r{k + 1}" for k in np.unique(owner))
+    timed = Timed(time, owner, owner, names, np.zeros(len(time)) if strain is None else strain, start)
+    return timed, next(m for m in timed.moments(every=1) if m.name == name)
+
+
 def test_a_moment_adds_a_step_a_gain_and_a_late_clock():
-    time = np.tile(np.linspace(0, 10, 21), 2)
-    owner = np.repeat([0, 1], 21)
-    timed, prediction = Timed(time, owner, owner), 3.0 * time
-    moment = next(m for m in timed.moments(["r1", "r2"]) if m.name == "at once in r2 at 5 s")
-    step, gain, late = moment.factor(prediction, timed).T
+    time, owner = np.tile(np.linspace(0, 10, 21), 2), np.repeat([0, 1], 21)
+    timed, moment = moment_of(time, owner, np.zeros(42), "at once in r2 at 5 s")
+    prediction = 3.0 * time
+    step, within, gain, slip, late = moment.factor(Disturbed(prediction, timed)).T
     inside = (owner == 1) & (time >= 5)
     assert step == pytest.approx(30.0 * inside)
+    assert within == pytest.approx(30.0 * ((owner == 1) & (time == 4.5)))  # the mean in which it happens
     assert gain == pytest.approx(prediction * inside)
+    assert not np.any(slip)  # where the strain stands still
     assert late == pytest.approx(0.3 * 3.0 * 10 * inside)  # slope times the duration
+
+
+def test_a_grip_that_lets_go_takes_the_slope_of_the_curve():
+    time, owner = np.linspace(0, 10, 81), np.zeros(81, int)
+    strain = 0.3 * np.sin(0.5 * time)
+    timed, moment = moment_of(time, owner, np.zeros(81), "at once in r1 at 5 s", strain)
+    slip = moment.factor(Disturbed(100 * strain + 400 * strain**3, timed))[:, 3]
+    assert slip == pytest.approx(np.ptp(strain) * (100 + 1200 * strain**2) * (time >= 5), rel=1e-6)
+
+
+def test_what_tears_stays_torn_in_recordings_that_begin_later():
+    time, owner = np.tile(np.linspace(0, 10, 21), 3), np.repeat([0, 1, 2], 21)
+    start, prediction = np.repeat([100.0, 50.0, 0.0], 21), 3.0 + time
+    timed, moment = moment_of(time, owner, start, "at once in r2 at 5 s")
+    lasting = moment.factor(Disturbed(prediction, timed))[:, -1]
+    assert lasting == pytest.approx(prediction * (((owner == 1) & (time >= 5)) | (owner == 0)))
+
+
+@pytest.mark.parametrize("lost", [0.5, 1.0, 4.0, -2.0])
+def test_a_block_that_a_recorder_skipped_or_repeated_is_what_a_moment_may_do(lost):
+    """Ramps and holds of which a part is missing: least squares leave little of it, and the slope alone most."""
+    time, owner = np.linspace(0, 40, 101), np.zeros(101, int)
+    timed, moment = moment_of(time, owner, np.zeros(101), "at once in r1 at 13.2 s")
+    prediction = np.interp(time, [0, 2, 10, 20, 22, 30, 38, 40], [0, 0, 10, 10, 2, 2, 10, 10])
+    change = np.where(time < 13.2, 0.0, np.interp(time + lost, time, prediction) - prediction)
+
+    def left(m) -> float:
+        f = m.factor(Disturbed(prediction, timed))
+        return float(np.linalg.norm(change - f @ np.linalg.lstsq(f, change, rcond=None)[0]))
+
+    jumping = moment.jumping(timed)
+    assert sum(m.chance for m in jumping) == pytest.approx(moment.chance)
+    best = min(jumping, key=left)
+    assert 40 * best.jump == pytest.approx(lost, rel=0.3)
+    assert left(best) < 0.12 * np.linalg.norm(change)
+    if abs(lost) >= 1:
+        assert left(moment) > 3 * left(best)
+
+
+def test_every_time_is_scanned_first_or_lies_beside_one_that_is():
+    time, owner = np.concatenate([np.linspace(0, 10, 203), np.linspace(0, 4, 30)]), np.repeat([0, 1], [203, 30])
+    timed = Timed(time, owner, owner, ("r1", "r2"), time, np.zeros(233))
+    first, every = timed.moments(), timed.moments(every=1)
+    assert sum(m.chance for m in every) == pytest.approx(0.5)
+    found = {m.name for f in first for m in (f, *timed.near(f))}
+    assert found == {m.name for m in every}
 
 
 def recorded(disturbed) -> Sample:
     """Pulls and pushes with holds of a neo-Hookean specimen in closed form, `disturbed` in stretch and stress."""
-    rng, recordings = np.random.default_rng(5), {}
+    rng, recordings, start = np.random.default_rng(5), {}, 0.0
     for name, far, ramp in (("slow", 1.3, 6.0), ("quick", 1.25, 2.0), ("push", 0.8, 3.0), ("last", 1.2, 2.5)):
         time = np.arange(0, 3 * ramp + 12, STEP)
         stretch = np.interp(time, [0, 1, 1 + ramp, 9 + ramp, 9 + 2 * ramp], [1, 1, far, far, 1])
         y = disturbed(name, time, stretch, lambda x: MU * (x - x**-2))
         channel = Channel(time, y + NOISE * rng.standard_normal(len(time)), "Pa", NOISE)
-        known = {"area": 1e-4, "height": 0.01}
+        known = {"area": 1e-4, "height": 0.01, "start": start}
+        start += 60.0
         recordings[name] = Recording(
             name, "uniaxial", {"time": time, "stretch": stretch}, {"nominal_stress": channel}, known
         )
@@ -84,6 +138,17 @@ def slipping(name, time, stretch, law):
     """The grip lets go by 0.04 in the hold of one recording, and by 0.03 in that of another."""
     gone = {"slow": (10.0, 0.04), "last": (7.0, 0.03)}.get(name, (1e9, 0.0))
     return law(stretch - gone[1] * (time >= gone[0]))
+
+
+def tearing(name, time, stretch, law):
+    """A third of the specimen tears in the hold of the first recording and bears nothing from then on."""
+    return law(stretch) * np.where((time >= 10.0) | (name != "slow"), 2 / 3, 1.0)
+
+
+def skipping(name, time, stretch, law):
+    """Every recording loses 1.2 s somewhere; what follows is shown too early and its end lasts."""
+    at = {"slow": 5.0, "quick": 2.2, "push": 9.0, "last": 6.5}[name]
+    return law(np.where(time < at, stretch, np.interp(time + 1.2, time, stretch)))
 
 
 def relaxing(name, time, stretch, law):
@@ -109,6 +174,14 @@ def test_a_grip_that_slips_is_no_relaxation_and_the_page_says_when():
     assert when["slow"] == pytest.approx(10.0, abs=0.8)
     assert when["last"] == pytest.approx(7.0, abs=0.8)
     assert any("at once in slow" in sentence for sentence in sure(answer))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("disturbed", [tearing, skipping])
+def test_a_tear_and_a_recorder_that_skips_are_called_by_no_name(disturbed):
+    answer = asked(disturbed)
+    assert answer.verdict.kind == "unexplained"
+    assert answer.verdict.confidence > 0.5
 
 
 @pytest.mark.slow

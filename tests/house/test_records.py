@@ -30,6 +30,7 @@ FORMULA = (0, 1, 2, 0.5)
 # What rounds, and where an iteration or a quadrature inside a formula ends: by file, the name it has or the function it
 # stands in, its value, and why.
 ROUNDING = {
+    "estimation/sudden.py": {"stiffness 3": "degree of a curve through a series, for its slope"},
     "estimation/discrepancy.py": {"LEFT_OUT 1e-05": "eigenvalues that are cut off"},
     "judgement/blocks.py": {"blocks 3": "time, strain and stress, each a third of a block's way"},
     "judgement/explore.py": {"score 3": "the first three of a tuple"},

@@ -152,6 +152,11 @@ class MaterialBench(Bench):
         return bench
 
     @property
+    def starts(self) -> dict[str, float]:
+        """When each recording began, s since the first one."""
+        return {n: float(t.start) for n, t in self._tests.items()}
+
+    @property
     def isotropic(self) -> bool:
         """Whether the base model, known physics included, knows no direction."""
         acting = {p.split(".")[1] for p in (*self.known, *self.base) if p.startswith("effects.")}

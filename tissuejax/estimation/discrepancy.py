@@ -32,7 +32,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tissuejax.estimation.smoothness import USUAL, Smoothness
-from tissuejax.estimation.sudden import Moment, Timed
+from tissuejax.estimation.sudden import Disturbed, Moment, Timed
 
 LEFT_OUT = 1e-5  # of the largest eigenvalue: what smooth parts are cut off at
 
@@ -48,6 +48,7 @@ class Series:
         strain: ln stretch or shear: along its own direction and the second one.
         states: loading states (`loading_states`), one column a shape.
         peak: typical largest stress of its recording, Pa.
+        start: when its recording began, s on the session's clock; all alike where the order is not known.
     """
 
     recording: str
@@ -56,6 +57,7 @@ class Series:
     strain: Float[np.ndarray, "n k"]
     states: Float[np.ndarray, "n w"]
     peak: float
+    start: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -175,9 +177,8 @@ class Discrepancy:
         errs = [d.change[:, None] * (self.in_time if d.timed else self.nearly) for d in done]
         errs = errs or [np.zeros((len(prediction), 1))]
         effects = Part("effects", "effect", np.concatenate(errs, axis=1))
-        timed = self.timed
-        moments = self.sudden if timed is not None else ()
-        once = tuple(Part(s.name, "sudden", s.factor(prediction, timed)) for s in moments if timed is not None)
+        disturbed = None if self.timed is None else Disturbed(prediction, self.timed)
+        once = tuple(Part(s.name, "sudden", s.factor(disturbed)) for s in self.sudden if disturbed is not None)
         return (*laws, *several, *turning, *self.fixed, effects, *changing, *once)
 
 
@@ -245,5 +246,11 @@ def discrepancy(
         tuple(np.exp(-d / smooth.waning) for d in apart if paced),
         np.concatenate([shared(smooth.law["law"], modes), belongs_to], axis=1),
         np.concatenate([shared(smooth.law["law"], modes, timed=paced), belongs_to], axis=1),
-        Timed(np.concatenate([s.time for s in series]), of, np.argmax(belongs_to, axis=1), smooth) if at_once else None,
+        _timed(series, of, belongs, smooth) if at_once else None,
     )
+
+
+def _timed(series: Sequence[Series], of: np.ndarray, belongs: np.ndarray, smooth: Smoothness) -> Timed:
+    time, strain = (np.concatenate(x) for x in ([s.time for s in series], [s.strain[:, 0] for s in series]))
+    names = tuple(dict.fromkeys(s.recording for s in series))
+    return Timed(time, of, belongs, names, strain, np.array([s.start for s in series])[of], smooth)

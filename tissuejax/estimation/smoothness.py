@@ -25,10 +25,14 @@ class Smoothness:
         band: tremble of a drive that is no turn, a share of its range. Ground: a drive under control is held to that.
         clock: by what share of a recording's duration a clock jumps where the stress would by its peak. Ground: a
             third is as far as a recorder skips unnoticed.
+        jumps: shares of a recording's duration by which a clock is asked whether it jumped, on and back. Ground: of a
+            hundredth means of samples show the slope alone; two thirds more each time, and a straight line between.
         edge: means of samples at either end of a recording that show no step. Ground: fewer than three can't be told
             from noise.
         moments: times in a recording that are asked whether something happened there, at most. Ground: cost; one in
             two means of samples.
+        followed: moments that are asked by how much the clock jumped, at most. Ground: cost; the moment of a jump is
+            among the first few by its slope, step and gain.
     """
 
     law: Mapping[str, float] = field(default_factory=lambda: {"law": 0.5, "fine law": 0.12})
@@ -39,8 +43,10 @@ class Smoothness:
     waning: float = 0.5
     band: float = 0.005
     clock: float = 0.3
+    jumps: tuple[float, ...] = tuple(x * 0.01 * 1.6**k for k in range(8) for x in (1, -1))
     edge: int = 3
     moments: int = 40
+    followed: int = 10
 
 
 USUAL = Smoothness()

@@ -84,13 +84,19 @@ def blocks(bench: Bench, several: Mapping[str, int] | None = None, means: Means 
 
 
 def series(
-    bench: Bench, cut: Blocks, states: Sequence[State], smooth: Smoothness = USUAL, means: Means = MEANS
+    bench: Bench,
+    cut: Blocks,
+    states: Sequence[State],
+    smooth: Smoothness = USUAL,
+    means: Means = MEANS,
+    starts: Mapping[str, float] | None = None,
 ) -> list[Series]:
     """The blocks as the discrepancy sees them.
 
     Args:
         states: of each segment (`driven_states`, or those of a bench that knows more).
         smooth: how a loading state turns; means: what a typical largest stress is.
+        starts: when recordings began, s on the session's clock, where that is known.
     """
     out = []
     for k, (s, state) in enumerate(zip(bench.segments, states, strict=True)):
@@ -104,6 +110,7 @@ def series(
                 own.mean(state.strain),
                 own.mean(loading_states(strain(s), smooth)),
                 float(max(peaks)) or 1.0,
+                (starts or {}).get(s.recording, 0.0),
             )
         )
     return out

@@ -51,6 +51,8 @@ class Criteria:
         sudden: standard deviation of the half-normal prior of what happens at once, where something does: share of the
             stress. Ground: a slip or a step worth a word is some per cent to a third of what is measured. Elsewhere it
             is `shares["sudden"]`: as good as nothing.
+        recurs: probability that something happens at once again where it has once. Ground: as likely as not; a grip
+            that slips and a recorder that skips do so more than once.
         change: standard deviation of the half-normal (two-sided: normal) prior of an effect's amplitude: the change of
             the stress that it makes alone, as a share of the stress (root mean squares). Ground: effects worth a name
             are some per cent to a half of what is measured.
@@ -99,6 +101,7 @@ class Criteria:
     partly: float = 0.5
     settled: frozenset[str] = frozenset({"peak", "effect", "added law"})
     sudden: float = 0.1
+    recurs: float = 0.5
     change: float = 0.3
     rig: float = 0.1
     shape: float = float(np.log(5.0))
@@ -125,3 +128,7 @@ class Criteria:
     def power(self, n: int, left: float = 1.0) -> float:
         """Of the evidence of n block means, that sets are compared by; `left`: the share of a rest in what is left."""
         return self.coarse / (self.coarse + n * left)
+
+    def happens(self, before: int) -> float:
+        """Probability that something happens at once after it has so many times."""
+        return self.recurs if before else self.unknown

@@ -22,7 +22,7 @@ from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.judge import Beforehand
 from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.scales import Scales, squared
-from tissuejax.diagnosis.judgement.sudden import begun, beside, happened, held, joined
+from tissuejax.diagnosis.judgement.sudden import beside, happened, held, joined
 from tissuejax.diagnosis.judgement.weigh import Start, Weighed
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.score import Score, complement, gain, trusted
@@ -322,14 +322,15 @@ class Exploration:
 
     def look_again(self) -> None:
         """Weigh the best sets and the base anew beside what may have happened at once by the best of them."""
-        while (moment := happened(self.scales, self.weighed[self.best], self.criteria)) is not None:
+        while (happening := happened(self.scales, self.weighed[self.best], self.criteria)) is not None:
+            before, moment = self.scales, happening.moment
             self.tell("looking at what happened at once beside", sorted(self.names(self.best)))
             best = sorted(self.weighed, key=self.worth)[: -self.effort.again - 1 : -1]
-            self.scales = joined(self.scales, moment)
+            self.scales = joined(before, moment)
             for key, w in self.weighed.items():
                 self.weighed[key] = beside(w, moment)
                 if key in best or not key:
-                    again = self._settled(w, w.refit.values, begun(w, self.criteria))
+                    again = self._settled(w, w.refit.values, happening.start(before, w, self.criteria))
                     if again.evidence.log_evidence > w.evidence.log_evidence:
                         self.weighed[key] = again
             if not held(self.weighed[self.best], moment):

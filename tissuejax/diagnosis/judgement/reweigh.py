@@ -22,7 +22,7 @@ from tissuejax.diagnosis.judgement.judge import left
 from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.scales import Scales
 from tissuejax.diagnosis.judgement.search import based, rooted
-from tissuejax.diagnosis.judgement.sudden import joined, scanned
+from tissuejax.diagnosis.judgement.sudden import joined, known_moments
 from tissuejax.diagnosis.judgement.weigh import Start, Weighed, weigh
 from tissuejax.errors import InputError
 from tissuejax.estimation.discrepancy import Discrepancy
@@ -128,7 +128,7 @@ def reweighed(
     scales, _ = based(bench, cut, of, criteria, replace(effort, course=course), Kept(), start)
     if found.noise_of is not None:
         scales.blocked = shown(scales.blocked, scales.bench, cut, scales.bench.predict(found.noise_of.values))
-    known = {m.name: m for m in scanned(scales)} if found.moments else {}
+    known = known_moments(of) if found.moments else {}
     for name in found.moments:
         if name not in known:
             raise InputError(f"{name}: no longer one of the moments that are scanned; search again")

@@ -33,7 +33,7 @@ class Scales:
         reference: the stress that it predicts, block means, Pa.
         peak: the largest stress, Pa.
         size: against which the rest is measured, by block: the peak, or what noise makes of it (`Criteria.unseen`).
-        moments: at which something may have happened at once.
+        moments: probability of each that is in the discrepancy, if something happened at once.
     """
 
     bench: Bench
@@ -45,7 +45,7 @@ class Scales:
     reference: Float[np.ndarray, " M"]
     peak: float
     size: Float[np.ndarray, " M"] | None = None
-    moments: int = 0
+    moments: tuple[float, ...] = ()
 
     def about(
         self,
@@ -54,6 +54,7 @@ class Scales:
         keys: Sequence[str] = (),
         values: Mapping[str, float] = MappingProxyType({}),
         slopes: Float[np.ndarray, "M p"] | None = None,
+        base: Float[np.ndarray, "M b"] | None = None,
     ) -> tuple[Part, ...]:
         """The discrepancy's parts beside a prediction (a long vector), and what the simulation has wrong there.
 
@@ -61,9 +62,10 @@ class Scales:
             keys: effects in the prediction, at `values`; what their laws err by is a part where that is known.
             slopes: of the prediction, in the constants of the tissue that the set frees: no law errs by what they could
                 do, and what a fault of the rig does is that fault's alone.
+            base: slopes in the base's constants; worked out where they are needed and not given.
         """
         here = np.nan_to_num(self.cut.mean(prediction))
-        done = self._done(here, bench, keys, values) if "effect" in self.families else []
+        done = self._done(here, bench, keys, values, base) if "effect" in self.families else []
         parts = self.discrepancy.about(here, done) if done else self.discrepancy.about(here)
         if done and slopes is not None:
             parts = tuple(self._across(p, slopes) if p.family == "effect" else p for p in parts)
@@ -72,7 +74,12 @@ class Scales:
         return (*parts, *(self._known(name, self.cut.mean(x)) for name, x in bench.numerical.items()))
 
     def _done(
-        self, here: Float[np.ndarray, " M"], bench: Bench, keys: Sequence[str], values: Mapping[str, float]
+        self,
+        here: Float[np.ndarray, " M"],
+        bench: Bench,
+        keys: Sequence[str],
+        values: Mapping[str, float],
+        slopes: Float[np.ndarray, "M b"] | None,
     ) -> list[Done]:
         """What each effect of the tissue does that the base's constants could not do in its place: the prediction less
         the one with its amplitudes at neutral, and of that what lies across all slopes of the base.
@@ -90,13 +97,13 @@ class Scales:
                 without = self.cut.mean(bench.predict({**values, **neutral}))
                 timed = any(bench.free[p].unit in CLOCKED for p in candidate.paths)
                 change = np.nan_to_num(here - without)
-                base = self._base(bench, values) if base is None else base
+                if base is None:
+                    known = (
+                        self.cut.mean(bench.jacobian(values, bench.base, bench.fitted)) if slopes is None else slopes
+                    )
+                    base = _span(np.nan_to_num(known))  # an orthonormal basis of what the base's constants can do
                 out.append(Done(change - base @ (base.T @ change), timed))
         return out
-
-    def _base(self, bench: Bench, values: Mapping[str, float]) -> Float[np.ndarray, "M p"]:
-        """An orthonormal basis of what the base's constants can do about `values`."""
-        return _span(np.nan_to_num(self.cut.mean(bench.jacobian(values, bench.base, bench.fitted))))
 
     def _across(self, part: Part, slopes: Float[np.ndarray, "M p"]) -> Part:
         """Of this part what lies across the slopes, each block in units of its noise (Plumlee 2017, JASA 112)."""
@@ -129,7 +136,7 @@ class Scales:
         chance = free * criteria.unknown / several + criteria.partly * partly
         if not sudden.any():
             return Widths(width, chance, criteria.strange)
-        chance = np.where(sudden, criteria.unknown / max(self.moments, 1), chance)
+        chance[sudden] = [criteria.happens(i) * p for i, p in enumerate(self.moments)]
         return Widths(width, chance, np.where(sudden, criteria.sudden / width, criteria.strange))
 
     def widened(self, keys: Sequence[str]) -> frozenset[str]:

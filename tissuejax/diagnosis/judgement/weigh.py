@@ -156,7 +156,8 @@ def weigh(
         if not np.isfinite(squared(jac / scales.blocked.sigma[:, None])):
             break  # a prediction without a slope, or with one beyond all numbers: no density is to be had there
         residual = y - scales.cut.mean(fit.prediction)
-        parts = scales.about(fit.prediction, bench, keys, fit.values, slopes[:, ~bound & own])
+        of_base = raw[:, : len(bench.base)]  # they come first
+        parts = scales.about(fit.prediction, bench, keys, fit.values, slopes[:, ~bound & own], of_base)
         prior = [priors.get(p) for p in descent.paths]
         weak = np.array([0.0 if p is None else p[1] ** -2 for p in prior])
         offset = np.array([0.0 if p is None else a - p[0] for a, p in zip(x, prior, strict=True)])

@@ -42,7 +42,7 @@ class MaterialTests(Recorded):
         """See `Recorded.left`."""
         criteria, whole = self.question.criteria, self.whole
         cut = blocks(whole, means=criteria.means)
-        stacked = series(whole, cut, strain_states(whole), criteria.smooth, criteria.means)
+        stacked = series(whole, cut, strain_states(whole), criteria.smooth, criteria.means, whole.starts)
         changing = paced(self.question.sample, criteria.shown)
         return cut, discrepancy(stacked, cut.spread(whole.sigma), changing, at_once=True, smooth=criteria.smooth)
 
