@@ -41,6 +41,23 @@ def test_a_shock_peaks_at_its_amount_after_its_time_and_dies_out():
     assert shift[-1] == pytest.approx(7.0 * (8 / 1.5) * np.exp(1 - 8 / 1.5))
 
 
+def test_an_amplifier_follows_a_step_at_its_pace_and_a_slow_rise_at_once():
+    P = np.where(TIME < 2, 0.0, 10.0)  # 100 a second, over a tenth of a second; at a quarter of that it takes four
+    out = stray_laws.slew(TRIAL, P, 3.0)
+    np.testing.assert_allclose(out[19:25], [0, 2.5, 5, 7.5, 10, 10])
+    slow = np.where(TIME < 5, TIME, 5 + 10 * (TIME - 5))
+    np.testing.assert_allclose(stray_laws.slew(TRIAL, slow, 1.0)[:51], slow[:51])
+    assert stray_laws.slew(TRIAL, slow, 1.0)[-1] == pytest.approx(5 + 5 * 5)
+
+
+def test_a_bumped_frame_rings_and_is_still_after_a_while():
+    rings = stray_laws.bumped(TRIAL, 3.0, 102.0, 0.4)
+    assert np.all(rings[:21] == 0)
+    assert rings[21] == pytest.approx(3 * np.exp(-0.05))  # a quarter of a period after
+    assert rings[23] == pytest.approx(-3 * np.exp(-0.15))
+    assert np.max(np.abs(rings[-20:])) < 0.2
+
+
 @pytest.mark.parametrize(("number", "before", "after"), [(0, 1.0, 1.0), (1, 1.0, 0.8), (2, 0.8, 0.8)])
 def test_a_probed_body_that_tore_stays_torn(number, before, after):
     i = Ingredient("torn", "", 0.2, {"number": 1, "where": 0.495})

@@ -7,11 +7,13 @@ import pytest
 from scipy.stats import halfnorm
 from test_judgement import made
 
-from tissuejax.diagnosis.diagnose import diagnose
+from tissuejax.diagnosis.diagnose import asked_of, diagnose
 from tissuejax.diagnosis.judgement.effort import Effort
+from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.marginal import Widths, amplitudes, marginal
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
-from tissuejax.diagnosis.judgement.sudden import gains
+from tissuejax.diagnosis.judgement.search import based
+from tissuejax.diagnosis.judgement.sudden import disrupted, gains, held, known_moments
 from tissuejax.estimation.discrepancy import Part
 from tissuejax.estimation.sudden import Disturbed, Timed
 from tissuejax.recordings.recording import Channel, Recording, Sample
@@ -159,6 +161,22 @@ def relaxing(name, time, stretch, law):
         carried = decay * carried + (elastic[i] - elastic[i - 1])
         out[i] = 0.7 * elastic[i] + 0.3 * carried
     return out
+
+
+def test_a_tear_is_found_though_a_gain_that_wanes_had_taken_it_up():
+    asked = asked_of(recorded(tearing), "neo-hookean")
+    cut, of = asked.left()
+    criteria, effort = asked.question.criteria, Effort()
+    scales, base = based(asked.whole, cut, of, criteria, effort, Kept())
+    assert base.evidence.amplitudes["waning gain"] > 0.1
+    scales, disturbed = disrupted(scales, base, criteria, effort.course)
+    (moment,) = [m for m in scales.discrepancy.sudden if held(disturbed, m)]
+    assert (moment.recording, moment.time) == (0, pytest.approx(10.0, abs=0.4))
+    assert disturbed.evidence.amplitudes["waning gain"] < 0.01
+    assert disturbed.evidence.log_evidence > base.evidence.log_evidence + 50
+    again = known_moments(scales.discrepancy)[moment.name]
+    assert (again.jump, again.chance) == (moment.jump, moment.chance)
+    assert np.array_equal(again.rows, moment.rows)
 
 
 def asked(disturbed):

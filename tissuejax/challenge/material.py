@@ -151,6 +151,10 @@ def sensed(specimen: Specimen, trial: Trial, P: History) -> History:
             P = stray_laws.torn(trial, P, stray.amount, **stray.shape)
         elif stray.name == "shock":
             P = P + stray_laws.shock(trial, stray.amount, **stray.shape).reshape(column)
+        elif stray.name == "bumped":
+            P = P + stray_laws.bumped(trial, stray.amount, **stray.shape).reshape(column)
+        elif stray.name == "slew":
+            P = stray_laws.slew(trial, P, stray.amount)
         elif stray.name == "cured":
             P = stray_laws.cured(trial, P, stray.amount, **stray.shape)
         elif stray.name == "stick-slip":

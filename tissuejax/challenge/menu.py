@@ -210,6 +210,10 @@ STRAY: tuple[Choice, ...] = (
         "noise",
         plain=False,
     ),
+    Choice("slew", "", 0.05, 20.0, plain=False),
+    Choice(
+        "bumped", "", 0.5, 80.0, lambda rng, s: {**_moment(rng, s), "period": _log(rng, 0.5, 2.0)}, "noise", plain=False
+    ),
 )
 
 NAMES = tuple(dict.fromkeys(c.name for c in CATALOGUED))

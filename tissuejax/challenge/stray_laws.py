@@ -85,3 +85,21 @@ def spikes(n: int, amount: float, share: float, rng: np.random.Generator) -> Flo
     """Electrical spikes of either sign and about `amount` (Pa) at a share of the samples."""
     hit = rng.random(n) < share
     return hit * rng.normal(0, amount, n)
+
+
+def slew(trial: Trial, P: History, amount: float) -> History:
+    """Amplifier whose output can't change faster than the quickest change of this recording over `1 + amount`."""
+    columns, out = P.reshape(len(P), -1), []
+    for c in columns.T:
+        step = np.diff(trial.time) * np.max(np.abs(np.diff(c) / np.diff(trial.time))) / (1 + amount)
+        follows = [c[0]]
+        for wanted, most in zip(c[1:], step, strict=True):
+            follows.append(follows[-1] + np.clip(wanted - follows[-1], -most, most))
+        out.append(follows)
+    return np.array(out).T.reshape(P.shape)
+
+
+def bumped(trial: Trial, amount: float, at: float, period: float) -> Float[np.ndarray, " n"]:
+    """Ringing of a frame that somebody bumps `at` s after the first recording began: dies out within five periods."""
+    since = np.maximum(trial.time + trial.start - at, 0) / period
+    return amount * np.exp(-since / 5) * np.sin(2 * np.pi * since)
