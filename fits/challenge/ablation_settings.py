@@ -6,7 +6,20 @@ from dataclasses import replace
 from tissuejax.diagnosis.judgement.criteria import Criteria
 
 # What sets are fitted and weighed by is in their evidence already: these want the diagnoses run again.
-WEIGHED = ("unknown", "shares", "strange", "partly", "sudden", "change", "rig", "shape", "loose", "alike", "misstated")
+WEIGHED = (
+    "unknown",
+    "shares",
+    "strange",
+    "partly",
+    "sudden",
+    "recurs",
+    "change",
+    "rig",
+    "shape",
+    "loose",
+    "alike",
+    "misstated",
+)
 WEIGHED += ("unseen", "smooth", "shown", "means", "simulated", "strokes")  # fits/real-panel/matters.py asks these
 
 

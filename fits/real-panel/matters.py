@@ -51,8 +51,15 @@ BEGIN, END = "<!-- matters: written by matters.py -->", "<!-- end of matters -->
 RUNS = HERE / "runs" / "matters"
 EVERY, FACTORS = int(os.environ.get("MATTERS_EVERY", "4")), (0.5, 2.0)
 # These decide what is tried or looked for, before any set is weighed: asked by a search.
-SEARCHED = ("effort", "criteria.shown", "criteria.means", "criteria.sudden", "criteria.shares.sudden")
-SEARCHED += tuple(f"criteria.smooth.{name}" for name in ("clock", "edge", "moments"))
+SEARCHED = (
+    "effort",
+    "criteria.shown",
+    "criteria.means",
+    "criteria.sudden",
+    "criteria.recurs",
+    "criteria.shares.sudden",
+)
+SEARCHED += tuple(f"criteria.smooth.{name}" for name in ("clock", "edge", "moments", "jump", "farther", "followed"))
 # A judge alone reads these: the sets as they are weighed usually, judged again.
 JUDGED = tuple(f"criteria.{name}" for name in rejudge.JUDGED if name != "lapse")
 # Of other kinds of recordings, or of a page: no sample of the panel feels them.

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 
 @dataclass(frozen=True)
 class Smoothness:
@@ -25,8 +27,9 @@ class Smoothness:
         band: tremble of a drive that is no turn, a share of its range. Ground: a drive under control is held to that.
         clock: by what share of a recording's duration a clock jumps where the stress would by its peak. Ground: a
             third is as far as a recorder skips unnoticed.
-        jumps: shares of a recording's duration by which a clock is asked whether it jumped, on and back. Ground: of a
-            hundredth means of samples show the slope alone; two thirds more each time, and a straight line between.
+        jump: share of a recording's duration from which on a clock is asked how far it jumped. Ground: of less means of
+            samples show the slope alone.
+        farther: by which factor the next jump that is asked is larger. Ground: a straight line reaches halfway.
         edge: means of samples at either end of a recording that show no step. Ground: fewer than three can't be told
             from noise.
         moments: times in a recording that are asked whether something happened there, at most. Ground: cost; one in
@@ -43,10 +46,17 @@ class Smoothness:
     waning: float = 0.5
     band: float = 0.005
     clock: float = 0.3
-    jumps: tuple[float, ...] = tuple(x * 0.01 * 1.6**k for k in range(8) for x in (1, -1))
+    jump: float = 0.01
+    farther: float = 1.6
     edge: int = 3
     moments: int = 40
     followed: int = 10
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """By which shares of a recording's duration a clock is asked whether it jumped, on and back."""
+        count = 1 + int(np.log(self.clock / self.jump) / np.log(self.farther))
+        return tuple(x * self.jump * self.farther**k for k in range(count) for x in (1, -1))
 
 
 USUAL = Smoothness()
