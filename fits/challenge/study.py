@@ -21,7 +21,7 @@ CURRENT = {
     "material": ("material", "material-second", "material-third", "material-fourth", "material-fifth",
                  "material-sixth", "material-seventh", "material-eighth", "material-ninth",
                  "material-tenth", "material-eleventh", "material-twelfth", "material-thirteenth",
-                 "material-fourteenth", "material-fifteenth", "material-sixteenth"),
+                 "material-fourteenth", "material-fifteenth", "material-sixteenth", "material-seventeenth"),
     "probing": ("probing", "probing-strong", "probing-strong-second", "probing-pairs", "probing-second",
                 "probing-strong-third", "probing-third", "probing-fourth", "probing-fifth", "probing-sixth",
                 "probing-seventh"),
@@ -29,7 +29,13 @@ CURRENT = {
 
 
 NEWEST = {
-    "material tests": ("material-thirteenth", "material-fourteenth", "material-fifteenth", "material-sixteenth"),
+    "material tests": (
+        "material-thirteenth",
+        "material-fourteenth",
+        "material-fifteenth",
+        "material-sixteenth",
+        "material-seventeenth",
+    ),
     "beside a rest": ("rest-seventh",),
     "probings": ("probing-seventh",),
     "probings beside a rest": ("probing-rest",),
