@@ -1,9 +1,10 @@
 """Lines in the spectrum of several series with phases of their own: least squares of a sinusoid at each frequency."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Complex, Float
 
 Series = Sequence[tuple[np.ndarray, np.ndarray]]
 
@@ -30,8 +31,19 @@ def periodogram(series: Series) -> tuple[Float[np.ndarray, " f"], Float[np.ndarr
         trend = np.polynomial.legendre.legvander(2 * t / t[-1] - 1, 2)
         r = y - trend @ np.linalg.lstsq(trend, y, rcond=None)[0]
         whole += float(r @ r)
-        power += 2 * np.abs(np.exp(-2j * np.pi * np.outer(frequencies, t)) @ r) ** 2 / len(r)
+        power += 2 * np.abs(_transform(frequencies, t, r)) ** 2 / len(r)
     return frequencies, power, whole
+
+
+def _transform(
+    frequencies: Float[np.ndarray, " f"], t: Float[np.ndarray, " n"], r: Float[np.ndarray, " n"]
+) -> Complex[np.ndarray, " f"]:
+    """sum r exp(-2 pi i f t) at evenly spaced frequencies: each is one of a few coarse ones and one of a few steps on,
+    so that two tables of a root of their number do for all."""
+    width = math.isqrt(len(frequencies) - 1) + 1
+    coarse = np.exp(-2j * np.pi * np.outer(frequencies[::width], t)) * r
+    fine = np.exp(-2j * np.pi * np.outer(frequencies[:width] - frequencies[0], t))
+    return (coarse @ fine.T).ravel()[: len(frequencies)]
 
 
 def lines(series: Series, most: int) -> list[float]:
