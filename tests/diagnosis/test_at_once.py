@@ -17,7 +17,7 @@ from tissuejax.diagnosis.judgement.sudden import disrupted, gains, held, known_m
 from tissuejax.estimation.discrepancy import Part
 from tissuejax.estimation.sudden import Disturbed, Timed
 from tissuejax.recordings.recording import Channel, Recording, Sample
-from tissuejax.report.judged_sentences import sure
+from tissuejax.report.judged_sentences import lead, sure
 
 MU, NOISE, STEP = 900.0, 4.0, 0.05
 TRIED = ("drift", "energy-form", "viscoelasticity", "slack", "periodic")
@@ -192,6 +192,11 @@ def test_a_grip_that_slips_is_no_relaxation_and_the_page_says_when():
     assert when["slow"] == pytest.approx(10.0, abs=0.8)
     assert when["last"] == pytest.approx(7.0, abs=0.8)
     assert any("at once in slow" in sentence for sentence in sure(answer))
+    moments = answer.as_dict()["rest"]["at_once"]
+    assert {m["recording"] for m in moments} >= {"slow", "last"}
+    assert lead(answer).startswith(
+        f"Something happened at once that no effect of the catalogue explains, in {moments[0]['recording']} at "
+    )
 
 
 @pytest.mark.slow

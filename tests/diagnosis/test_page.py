@@ -113,6 +113,19 @@ def test_what_is_unexplained_sends_the_reader_to_the_remainder(stepping):
     assert plot.draw(data) is not None
 
 
+def test_the_lead_says_when_something_happened_at_once_before_it_says_that_nothing_explains_it(stepping, monkeypatch):
+    assert stepping.answered.rest()["at_once"] == []
+    assert "at once" not in judged_sentences.lead(stepping)
+    moments = [
+        {"recording": "last", "time": 7.04, "amplitude": 0.2},
+        {"recording": "slow", "time": 10.0, "amplitude": 0.1},
+    ]
+    rest = stepping.answered.rest() | {"at_once": moments}
+    monkeypatch.setattr(type(stepping.answered), "rest", lambda self: rest)
+    assert judged_sentences.lead(stepping).startswith("Something happened at once")
+    assert "in last at 7.04 s and slow at 10 s:" in judged_sentences.lead(stepping)
+
+
 def test_noise_has_no_picture_of_a_remainder(relaxing):
     assert DiagnosisRemainder().prepare(relaxing) is None
 

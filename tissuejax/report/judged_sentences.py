@@ -75,8 +75,14 @@ def size(d: Diagnosis) -> str:
     return f"{value:.3g} {unit} root mean square, {share} of the largest {'stress' if 'Pa' in unit else 'force'}"
 
 
+def at_once(d: Diagnosis) -> str:
+    """Where something happened at once, the largest first: "slow at 10 s and last at 7 s"; empty where nothing did."""
+    where = [f"{m['recording']} at {m['time']:.3g} s" for m in d.answered.rest()["at_once"]]
+    return joined(where[:3]) if where else ""
+
+
 def lead(d: Diagnosis) -> str:
-    """The verdict in one or two sentences."""
+    """The verdict in a few sentences."""
     a = d.answered
     j = a.judgement
     removed = f"explains {100 * a.explained[0]:.0f} % of what {d.energy} misses in the fitted recordings"
@@ -92,9 +98,10 @@ def lead(d: Diagnosis) -> str:
     if j.kind is Kind.IN_PART:
         more = [f"{n} ({100 * p:.0f} in 100)" for n, p in j.inclusion.items() if n not in j.names and p > 0.1]
         also = f" Perhaps also {joined(more, 'or')}." if more else ""
+        once = f" Something without a name happened at once in {where}." if (where := at_once(d)) else ""
         return (
             f"Missing: {joined(list(j.names))}. It {removed}. That is not all: {size(d)} is left that has no name."
-            f"{also}"
+            f"{once}{also}"
         )
     if j.kind is Kind.AMBIGUOUS:
         others = [joined(list(x["effects"])) for x in d.alternatives()]
@@ -105,6 +112,11 @@ def lead(d: Diagnosis) -> str:
         )
     best = joined(list(dict.fromkeys(a.bench.candidates[k].name for k in a.chosen.keys))) if a.chosen.keys else ""
     attempt = f" The best attempt, {best}, is less probable than that." if best else ""
+    if where := at_once(d):
+        return (
+            f"Something happened at once that no effect of the catalogue explains, in {where}: {size(d)} of the misfit "
+            f"has no better account than that and a smooth, nameless rest.{attempt}"
+        )
     return (
         f"Something is missing that no effect of the catalogue explains: {size(d)} of the misfit has no better account "
         f"than a smooth, nameless rest.{attempt}"

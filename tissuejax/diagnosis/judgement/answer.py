@@ -121,7 +121,8 @@ class Answered:
 
     def rest(self) -> dict:
         """What the chosen model leaves beyond noise: `rms`, Pa, of the discrepancy's posterior mean; shares; typical
-        amplitudes of its `parts`, and of those that are the business of an effect that is `named`."""
+        amplitudes of its `parts`, and of those that are the business of an effect that is `named`; where something
+        happened `at_once` (recording, s, amplitude; the largest first)."""
         s, e = self.judgement.chosen, self.exploration
         named = e.scales.widened(s.keys)
         w = e.weighed[frozenset(s.keys)]
@@ -133,6 +134,13 @@ class Answered:
                 np.sum(w.rest[rows] ** 2 * blocks[rows])
             )
         whole = sum(squares.values())
+        of = e.scales.discrepancy
+        moments = of.sudden if isinstance(of, Discrepancy) and of.timed is not None else ()
+        at_once = [
+            {"recording": of.timed.names[m.recording], "time": m.time, "amplitude": s.amplitudes[m.name]}
+            for m in moments
+            if s.amplitudes.get(m.name, 0.0) > 0
+        ]
         return {
             "rms": float(np.sqrt(whole / np.sum(blocks))),
             "unit": self.bench.segments[0].unit if self.bench is self.fitting else "1",
@@ -141,6 +149,7 @@ class Answered:
             "recordings": {n: x / whole if whole else 0.0 for n, x in squares.items()},
             "parts": {p.name: s.amplitudes[p.name] for p in w.parts if p.family not in named},
             "named": {p.name: s.amplitudes[p.name] for p in w.parts if p.family in named},
+            "at_once": sorted(at_once, key=lambda m: -m["amplitude"]),
             "kurtosis": s.kurtosis,
         }
 
