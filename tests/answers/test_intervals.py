@@ -115,12 +115,18 @@ def test_the_evidence_of_a_linear_law_is_the_integral():
     by_hand = best + math.log(s * math.sqrt(2 * math.pi) / 1800.0)
     told = evidence(Target(found.problem), 400, 3)
     assert told.log_evidence == pytest.approx(by_hand, abs=0.15)
+    draws = told.draws.ravel()  # of the posterior too: they have moved apart, and lie as the normal law says
+    assert len(np.unique(draws)) > 0.9 * len(draws)
+    assert draws.mean() == pytest.approx(found.values["energy.mu"], abs=0.15 * s)
+    assert draws.std() == pytest.approx(s, rel=0.1)
     prior = tj.fit(
         sample(0.95),
         "neo-hookean",
         search=ONCE,
         unknowns=tj.Unknowns(priors={"energy.mu": (900.0, 150.0)}),
     )
+    assert found.chi2_per_dof == pytest.approx(found.chi2 / 39)
+    assert prior.chi2_per_dof == pytest.approx(prior.chi2 / 40)  # what was known beforehand counts as a datum
     data = sample(0.95).recordings["pull"].channels["nominal_stress"].values
     cov = SIGMA**2 * np.eye(40) + 150.0**2 * np.outer(X, X)
     r = np.asarray(data) - 900 * X

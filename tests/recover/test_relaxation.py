@@ -1,6 +1,7 @@
 """Fits of relaxing specimens: number of terms, their sum, their times, where they start; data from own formulas."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,9 +9,11 @@ import pytest
 import tissuejax as tj
 from tissuejax.effects.catalogue import effect
 from tissuejax.errors import InputError
+from tissuejax.estimation.problem import Problem
 from tissuejax.estimation.transforms import Box, Sticks, chained, unchained
 from tissuejax.estimation.weights import Weights
 from tissuejax.experiments.predictor import predictor
+from tissuejax.fitting import idle as idle_module
 from tissuejax.fitting.idle import merged, roused, woken
 from tissuejax.fitting.idle import terms as idle_terms
 from tissuejax.fitting.least_squares import descend
@@ -241,6 +244,35 @@ def test_an_idle_term_wakes_where_it_is_needed():
     pairs = sorted((values[f"{name}tau{i}"], values[f"{name}g{i}"]) for i in (1, 2))
     assert pairs == [pytest.approx((0.6, 0.2), rel=0.05), pytest.approx((15.0, 0.3), rel=0.05)]
     assert woken(posed, values) is None
+
+
+def test_a_term_is_tried_at_times_even_in_their_logarithm_between_its_bounds(monkeypatch):
+    """Nine inside (lower, upper); where zero bounds it, nine decades under the upper end are the lower one."""
+    posed = problem(predictor(tj.material("neo-hookean", effects=["viscoelasticity"]), pulled([(0.3, 8.0)])))
+    share, time = (f"effects.viscoelasticity.{n}1" for n in ("g", "tau"))
+    tried = []
+    monkeypatch.setattr(idle_module, "_scored", lambda *given: tried.append([c[time] for c in given[3]]) or None)
+    for lower, upper in ((0.5, 50.0), (0.0, 50.0)):
+        monkeypatch.setattr(Problem, "bound", lambda self, path, ends=(lower, upper): ends)
+        assert idle_module._promising(posed, posed.start, share, time, {share, time}) is None
+    least = np.array([0.5, 50e-9])
+    expected = [a * (50 / a) ** (np.arange(1, 10) / 10) for a in least]
+    np.testing.assert_allclose(tried, expected, rtol=1e-9)
+
+
+def test_shapes_of_an_idle_modulus_are_drawn_evenly_over_all_they_may_be():
+    """A bounded one over its range, one without an end from a tenth to a hundred times its typical value."""
+    known = {"open": SimpleNamespace(typical=2.0), "angle": SimpleNamespace(typical=1.0)}
+    bounds = {"open": (0.0, np.inf), "angle": (1.0, 3.0)}
+    posed = SimpleNamespace(
+        bound=bounds.get, predictor=SimpleNamespace(model=SimpleNamespace(parameters=known)), free=list(known)
+    )
+    drawn = idle_module._drawn(posed, list(known))
+    decades, angle = np.log10([d["open"] / 2.0 for d in drawn]), np.array([d["angle"] for d in drawn])
+    assert len(drawn) == 64
+    for values, low, high in ((decades, -1, 2), (angle, 1, 3)):
+        inner = (np.sort(values) - low) / (high - low)
+        np.testing.assert_allclose(inner, (np.arange(64) + 0.5) / 64, atol=1 / 64)  # one in every 64th
 
 
 def test_terms_at_one_time_are_one():
