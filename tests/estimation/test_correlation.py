@@ -143,6 +143,14 @@ def test_white_noise_of_another_size_than_recorded_stays_white(rng, level):
     assert found.levels == pytest.approx([level] * 2, rel=0.08)
 
 
+def test_correlated_noise_of_less_than_was_recorded_is_found_with_its_size_and_time(rng):
+    """A variance over T is known to sqrt(2 tau / T), 13 % here: a level to 6.3 %, three standard errors are 19 %."""
+    series = [Series(FAST, 0.6 * wandering(rng, FAST, 0.2)[:, None]) for _ in range(3)]
+    found = estimate(series)
+    assert found.levels == pytest.approx([0.6] * 3, rel=0.19)
+    assert found.noises[0].tau == pytest.approx(0.2, rel=0.25)
+
+
 def test_what_exceeds_the_recorded_variance_is_no_noise(rng):
     """Correlated on all lags but five times as large as recorded: a mismatch that is no smooth function."""
     left = rng.normal(size=(626, 1)) + 5 * wandering(rng, FAST, 3.0)[:, None]

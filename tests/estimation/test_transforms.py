@@ -1,9 +1,11 @@
 """Coordinates of a descent: there and back, and derivatives through them against differences."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from tissuejax.estimation.transforms import Box, Sticks, chained, unchained
+from tissuejax.estimation.transforms import Box, Sticks, chained, unchained, width
+from tissuejax.fitting.target import bounded
 
 LOWER = [-np.inf, 0.0, -np.inf, -1.0, 0.0, 0.0, -np.inf]
 UPPER = [np.inf, np.inf, 5.0, 3.0, 1.0, 1.0, np.inf]
@@ -38,3 +40,20 @@ def test_what_lies_on_or_beyond_a_bound_begins_a_little_inside():
     assert 1.99 < inside[1] < 2
     assert 0 < inside[2] < 1
     assert box.inward(np.array([0.5, 0.0, 5.0])) == pytest.approx([0.5, 0.0, 5.0])
+
+
+def test_the_traced_transform_is_the_same(rng):
+    """What samplers of a posterior use, with the logarithm of its slope."""
+    box, y = Box(LOWER, UPPER, SCALE), rng.normal(size=7)
+    x, slope = box.bounded(y)
+    traced, logs = bounded(box, jnp.asarray(y))
+    np.testing.assert_allclose(traced, x, rtol=1e-12)
+    np.testing.assert_allclose(logs, np.log(slope), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "scale", "expected"),
+    [(2.0, 2.5, 1.0, 0.5), (2.0, 9.0, 1.0, 1.0), (0.0, np.inf, 3.0, 3.0), (-np.inf, 4.0, 3.0, 3.0)],
+)
+def test_nearness_to_a_bound_goes_by_the_range_or_by_what_is_typical(lower, upper, scale, expected):
+    assert width(lower, upper, scale) == expected
