@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tissuejax.estimation.covariance import uncertainty
+from tissuejax.estimation.covariance import inflation, uncertainty
 
 NAMES, UNITS = ("a", "b", "c"), ("Pa", "1", "s")
 
@@ -40,3 +40,17 @@ def test_a_flat_direction_has_no_error_and_neither_have_its_members():
     assert np.isinf(of.std[:2]).all()
     assert of.std[2] == pytest.approx(0.25)
     assert of.sentences
+
+
+@pytest.mark.parametrize(
+    ("chi2", "n", "k", "estimated", "expected"),
+    [
+        (94.0, 50, 3, False, (2.0, 47.0)),  # more than the noise: widened, Student's t of 47
+        (94.0, 50, 3, True, (2.0, 47.0)),
+        (23.5, 50, 3, False, (1.0, np.inf)),  # a recorded level is not narrowed by chance
+        (23.5, 50, 3, True, (0.5, 47.0)),
+        (6.0, 3, 3, True, (6.0, 1.0)),  # none to spare: one is taken
+    ],
+)
+def test_variances_are_inflated_by_the_misfit_a_degree_of_freedom(chi2, n, k, estimated, expected):
+    assert inflation(chi2, n, k, estimated) == pytest.approx(expected)

@@ -10,18 +10,17 @@ import numpy as np
 import pytest
 import scipy.optimize
 import scipy.stats
-from toy import ToyModel, ToyPredictor, toy_sample
+from toy import TRUE, ToyModel, ToyPredictor, problem, toy_sample
 
 from tissuejax.errors import InputError
 from tissuejax.estimation.losses import soften
 from tissuejax.estimation.numerical import changes
-from tissuejax.estimation.problem import Problem
 from tissuejax.estimation.transforms import WHOLE
 from tissuejax.estimation.weights import Weights, noise
 from tissuejax.experiments.probing_settings import REFINED, ProbingSettings
 from tissuejax.fitting import sobol as sobol_module
 from tissuejax.fitting.cut_resolution import resolution
-from tissuejax.fitting.gradient_descent import gradient_descent, objective
+from tissuejax.fitting.gradient_descent import objective
 from tissuejax.fitting.least_squares import fit
 from tissuejax.fitting.memory import LENGTHS, begun_loaded, spread
 from tissuejax.fitting.options import Search
@@ -32,14 +31,6 @@ from tissuejax.fitting.sobol import sobol
 from tissuejax.fitting.starts import LEAST, SPREAD, fitted_moduli, variations
 from tissuejax.parameters import Parameter
 from tissuejax.recordings.recording import Channel, Recording, Sample
-
-TRUE = {"energy.a": 80.0, "energy.b": 40.0, "energy.rate": 0.7, "energy.offset": 5.0}
-
-
-def problem(sample, free, kind=ToyPredictor, **options):
-    predictor = kind(sample)
-    start = {path: d.default for path, d in predictor.model.parameters.items()} | TRUE | options.pop("start", {})
-    return Problem(predictor, free, start, noise(sample, predictor.names, "auto"), **options)
 
 
 class Shared(ToyPredictor):
@@ -170,18 +161,6 @@ def test_a_modulus_that_nothing_depends_on_stays_a_number():
     np.testing.assert_allclose(solved, wanted, atol=1e-12)
     np.testing.assert_allclose(left, 0, atol=1e-12)
     assert inside.all()
-
-
-@pytest.mark.parametrize(("method", "steps"), [("adam", 30), ("lbfgs", 3)])
-def test_a_gradient_method_takes_as_many_steps_as_it_says(rng, method, steps):
-    p = problem(toy_sample(rng, TRUE), ("energy.a", "energy.rate"))
-    p = dataclasses.replace(p, start=p.start | {"energy.a": 20.0, "energy.rate": 0.1})
-    taken = []
-    ended = gradient_descent(
-        p, p.box.free(p.vector(p.start)), method, max_steps=3, tolerance=1e-9, on_accept=lambda n, *_: taken.append(n)
-    )
-    assert ended.runs == steps
-    assert taken[-1] == steps
 
 
 def test_numbers_in_the_sentences_on_a_cut_s_resolution():

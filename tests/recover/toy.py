@@ -5,8 +5,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from tissuejax.energies.energy import Energy
+from tissuejax.estimation.problem import Problem
+from tissuejax.estimation.weights import noise
 from tissuejax.parameters import Parameter
 from tissuejax.recordings.recording import Channel, Recording, Sample
+
+TRUE = {"energy.a": 80.0, "energy.b": 40.0, "energy.rate": 0.7, "energy.offset": 5.0}
 
 
 class ToyEnergy(Energy):
@@ -100,3 +104,9 @@ def toy_sample(rng, true, noise=1.0, recorded=True, n=400, names=("r1", "r2"), l
         channel = Channel(t, y, "Pa", noise if recorded else None)
         recordings[name] = Recording(name, "toy", {"time": t}, {"nominal_stress": channel}, {})
     return Sample("toy", recordings)
+
+
+def problem(sample, free, kind=ToyPredictor, **options):
+    predictor = kind(sample)
+    start = {path: d.default for path, d in predictor.model.parameters.items()} | TRUE | options.pop("start", {})
+    return Problem(predictor, free, start, noise(sample, predictor.names, "auto"), **options)
