@@ -124,6 +124,8 @@ def test_the_lead_says_when_something_happened_at_once_before_it_says_that_nothi
     monkeypatch.setattr(type(stepping.answered), "rest", lambda self: rest)
     assert judged_sentences.lead(stepping).startswith("Something happened at once")
     assert "in last at 7.04 s and slow at 10 s:" in judged_sentences.lead(stepping)
+    moments[:] = [{"recording": "last", "time": 7.04, "amplitude": 0.0004}]
+    assert "at once" not in judged_sentences.lead(stepping), "less than a thousandth is no news"
 
 
 def test_noise_has_no_picture_of_a_remainder(relaxing):

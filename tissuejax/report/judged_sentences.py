@@ -36,6 +36,7 @@ PARTS = {
 }
 
 SEEN = 1e-5  # of the peak: no sensor tells less, and an amplitude at its bound is rounding
+LITTLE = 1e-3  # of the stress: a part that is less is no news
 
 
 def _part(name: str) -> str:
@@ -76,8 +77,10 @@ def size(d: Diagnosis) -> str:
 
 
 def at_once(d: Diagnosis) -> str:
-    """Where something happened at once, the largest first: "slow at 10 s and last at 7 s"; empty where nothing did."""
-    where = [f"{m['recording']} at {m['time']:.3g} s" for m in d.answered.rest()["at_once"]]
+    """Where something of note happened at once, the largest first: "slow at 10 s and last at 7 s"; empty where nothing
+    did."""
+    moments = [m for m in d.answered.rest()["at_once"] if m["amplitude"] > LITTLE]
+    where = [f"{m['recording']} at {m['time']:.3g} s" for m in moments]
     return joined(where[:3]) if where else ""
 
 
@@ -163,16 +166,16 @@ def sure(d: Diagnosis) -> list[str]:
         told.append(f"{_over_noise(a.chosen, bool(a.bench.held_out))} with {named}")
     out.append(f"Root mean square of the misfit over the stated noise: {', '.join(told)}.")
     rest = a.rest()
-    own = [f"{_part(k)} {100 * v:.2g} %" for k, v in rest["named"].items() if v > 1e-3]
+    own = [f"{_part(k)} {100 * v:.2g} %" for k, v in rest["named"].items() if v > LITTLE]
     if own:
         out.append(
             f"Of what has a name, beyond its parameters (typical amplitudes, shares of the stress): {'; '.join(own)}."
         )
     apart = ("mesh", "speed", "ringing", "effects")
-    large = [f"{_part(k)} {100 * v:.2g} %" for k, v in rest["parts"].items() if v > 1e-3 and k not in apart]
+    large = [f"{_part(k)} {100 * v:.2g} %" for k, v in rest["parts"].items() if v > LITTLE and k not in apart]
     if large:
         out.append(f"What is left, by kind, as shares of the stress (typical amplitudes): {'; '.join(large)}.")
-    if (errs := rest["parts"].get("effects", 0.0)) > 1e-3:
+    if (errs := rest["parts"].get("effects", 0.0)) > LITTLE:
         out.append(
             f"The law of what is named is only nearly right here: it errs by {100 * errs:.2g} % of what it does "
             "(typical amplitude)."
