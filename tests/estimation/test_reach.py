@@ -7,8 +7,8 @@ from scipy.optimize import minimize
 from tissuejax.estimation.reach import TURN, Reach, Whole
 
 
-@pytest.mark.parametrize("most", [0.8, 0.5])
-def test_parts_that_would_be_more_than_the_whole_become_just_that_as_well_as_may_be(rng, most):
+@pytest.mark.parametrize(("most", "size"), [(0.8, 1.0), (0.5, 1.0), (0.5, 1e5)])
+def test_parts_that_would_be_more_than_the_whole_become_just_that_as_well_as_may_be(rng, most, size):
     """min |T s - aim|^2 + |damped s|^2 where two coordinates may together not exceed a whole; a second whole is far."""
     triangle, damped = np.triu(rng.normal(size=(5, 5))) + 2 * np.eye(5), np.full(5, 0.3)
     y, aim = np.array([0.2, 0.1, -0.4, 0.05, 0.05]), 3.0 * rng.normal(size=5)
@@ -24,7 +24,7 @@ def test_parts_that_would_be_more_than_the_whole_become_just_that_as_well_as_may
         cost, np.zeros(5), bounds=[(-2 - v, 2 - v) for v in y], tol=1e-14, method="SLSQP",
         constraints={"type": "ineq", "fun": lambda s: most - np.sum((y + s)[:2])},
     )  # fmt: skip
-    found = reach.trial(triangle, aim, damped, y, 0)
+    found = reach.trial(size * triangle, size * aim, size * damped, y, 0)  # whatever the size of the residuals
     assert found == pytest.approx(y + held.x, abs=1e-5)
     assert np.sum(found[:2]) == pytest.approx(most, abs=1e-12)
 
