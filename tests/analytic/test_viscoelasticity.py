@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -155,6 +156,27 @@ def test_nonlinear_viscosity_takes_the_corners_of_its_load(tau, m):
     found = predicted(effect("nonlinear-viscosity"), values, time)
     expected = reported(l, S11 - g * z11, S33 - g * z33)
     np.testing.assert_allclose(found, expected, atol=2e-9 * np.abs(expected).max())
+
+
+def test_nonlinear_viscosity_is_differentiated_in_both_modes():
+    """A plain prediction runs another loop than one that is differentiated: the same values, and their slopes."""
+    time = np.linspace(0, 15, 16)
+    at = jnp.array([0.4, 3.0, 150.0, 3.0])
+    model = BASE.with_effects(effect("nonlinear-viscosity"))
+    predict = predictor(model, Sample("s", {"r": recording("r", "uniaxial", time, drive(time))})).predict
+
+    def total(x):
+        moved = dict(zip(("g", "tau", "stress", "exponent"), x, strict=True))
+        found = predict(VALUES | {f"effects.nonlinear-viscosity.{k}": v for k, v in moved.items()})
+        return jnp.sum(jnp.sin(found["r"].channels["nominal_stress"].values / 100))
+
+    value, forward = jax.jvp(total, (at,), (at,))
+    assert float(value) == pytest.approx(float(total(at)), rel=1e-12)
+    backward = np.asarray(jax.grad(total)(at))
+    assert float(forward) == pytest.approx(backward @ np.asarray(at), rel=1e-9)
+    for k in range(len(at)):
+        h = jnp.zeros(4).at[k].set(1e-3 * at[k])
+        assert backward[k] == pytest.approx(float((total(at + h) - total(at - h)) / (2 * h[k])), rel=1e-5)
 
 
 @pytest.mark.parametrize("law", ["erf", "tanh"])

@@ -38,8 +38,7 @@ from tissuejax.recordings.recording import Sample
 STRESS_CHANNEL = "nominal_stress"
 SHORTEST = 128  # samples that a series is lengthened to
 STEP = 1e-6  # of a parameter's scale
-SIZE = 10.0  # by which the base's defaults may be off before they are brought to size
-STRESS = 0.05  # of the largest stress: the least scale of a modulus or an offset
+STRESS = 0.05  # of the largest stress: the scale of a modulus or an offset
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,32 +185,34 @@ class MaterialBench(Bench):
             self._neutral |= {f"effects.{entry.effect.name}.{k}": v for k, v in entry.effect.neutral.items()}
         for path, p in whole.declared.items():
             if path.startswith("energy.") and not p.frozen:
-                self.free[path] = Free(p.lower, p.upper, p.typical, p.unit)
+                self.free[path] = self._fitting(Free(p.lower, p.upper, p.typical, p.unit))
                 self.start[path] = p.default
         self.base = tuple(self.free)
         for entry in every:
             free, start, candidates = entry.declare(whole, self.fitted, self.held_out)
-            # skin and rubber are a thousand times as stiff as what the scales are declared for
-            for path, f in free.items():
-                if f.unit == "Pa" and not f.log:
-                    free[path] = replace(f, scale=max(f.scale, STRESS * self._top))
-            self.free.update(free)
+            self.free.update({path: self._fitting(f) for path, f in free.items()})
             self.start.update(start)
             self.candidates.update({c.key: c for c in candidates})
         self.candidates = linked(found, self.candidates)
         self._amplitudes = {p for c in self.candidates.values() for p in c.amplitudes}
 
+    def _fitting(self, f: Free) -> Free:
+        """The same with a scale that fits the recordings' stress, whatever the declared one was made for: beside what
+        changes all of the stress by a tenth a step by a soft tissue's modulus is no more than the error of a difference
+        in skin, tendon or rubber, and would never be taken."""
+        usual = STRESS * self._top
+        units = {"Pa": usual, "Pa/s": usual / self.sizes.recording, "1/Pa": STRESS / (self._top or 1.0)}
+        return f if f.log or not usual else replace(f, scale=units.get(f.unit, f.scale))
+
     def _size_up(self) -> None:
-        """Bring the base's moduli near what the recordings ask for, where defaults are off by more than ten times.
+        """Bring the base's moduli to the size that the recordings ask for.
 
         A descent that starts at soft tissue doesn't find rubber: with a law that ends at a limiting stretch it stops.
         """
         rows = self.mask(self.fitted)
-        if not np.any(self.y[rows]):
-            return
         p = self.predict({}, self.fitted)[rows]
         ratio = float(p @ self.y[rows] / max(p @ p, 1e-300)) if np.all(np.isfinite(p)) else 1.0
-        if ratio > SIZE or 0 < ratio < 1 / SIZE:
+        if ratio > 0:
             for path in self.base:
                 self.start[path] *= ratio if self.free[path].unit == "Pa" else 1.0
 

@@ -1,11 +1,13 @@
 """A nonlinear Maxwell element: the faster it flows, the more it is loaded."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import ClassVar
 
 import diffrax
+import jax
 import jax.numpy as jnp
-from jaxtyping import Array
+from jaxtyping import Array, Float
 
 from tissuejax.effects.effect import Effect
 from tissuejax.effects.form import Form, Offer, Sizes
@@ -46,7 +48,7 @@ class NonlinearViscosity(Effect):
         grid = {"tau": (0.1 * sizes.recording, sizes.recording), "stress": (load,), "exponent": (3.0,)}
         free = ("g", "tau", "stress", "exponent")
         form = Form("load-dependent", free, grid, nominated=False, beside=("one time", "two times"))
-        return Offer(cls(), (form,), "viscoelasticity")
+        return Offer(cls(), (form,), "viscoelasticity", ranges={"stress": (0.1 * load, 10 * load, load)})
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -59,41 +61,64 @@ class NonlinearViscosity(Effect):
 
     def memory(self, p: Mapping[str, Array], test: MaterialTest, state: Stress) -> Stress:
         s = state.stacked()
-        scaled = s / p["stress"]
-        n = len(test.time)
-        # Repeated times are set apart by a billionth of a step, so that interpolation is defined; those at the end
-        # (padding) by the whole recording, where nothing is integrated.
-        end = test.elapsed[-1]
-        apart = 1e-9 * end / n
-        padding = jnp.arange(n) > jnp.argmax(test.elapsed >= end)
-        time = jnp.where(padding, 2.0 * end, test.elapsed) + jnp.arange(n) * apart
-        end = jnp.max(jnp.where(padding, 0.0, time))
-        rate = jnp.diff(scaled, axis=0) / jnp.diff(time)[:, None]
-        norm = jnp.array([1.0, 1.0, 1.0, 2.0], s.dtype)  # the shear component counts twice in S : S
+        flowed = flowed_away(s / p["stress"], jnp.asarray(test.elapsed), p["tau"], p["exponent"])
+        return state.replaced(s - p["g"] * (flowed * p["stress"]))
 
-        def flow(t, z, _):
-            # `diffrax.LinearInterpolation` finds the interval by halving, a loop that costs more than all the rest
-            k = jnp.clip(jnp.searchsorted(time, t, method="compare_all") - 1, 0, n - 2)
-            load = scaled[k] + rate[k] * (t - time[k]) - z
-            return load / p["tau"] * (1 + load @ (norm * load)) ** ((p["exponent"] - 1) / 2)
 
-        controller = diffrax.PIDController(rtol=1e-9, atol=1e-10)
-        solution = diffrax.diffeqsolve(
-            diffrax.ODETerm(flow),
-            diffrax.Tsit5(),
-            time[0],
-            end,
-            None,
-            scaled[0],
-            saveat=diffrax.SaveAt(t0=True, steps=True),
-            stepsize_controller=diffrax.ClipStepSizeController(controller, step_ts=time),
-            adjoint=diffrax.DirectAdjoint(),
-            max_steps=16384,
-            throw=False,
-        )
-        assert solution.ts is not None  # `saveat` asks for both
-        assert solution.ys is not None
-        # Every sample ends a step, to rounding. Asked for samples, diffrax would check their times by a call back into
-        # Python, and a program that does so can't be kept on disk.
-        at = jnp.searchsorted(solution.ts, jnp.minimum(time, end) - 0.5 * apart)
-        return state.replaced(s - p["g"] * (solution.ys[at] * p["stress"]))
+@jax.custom_jvp
+def flowed_away(
+    scaled: Float[Array, "n 4"], elapsed: Float[Array, " n"], tau: Float[Array, ""], exponent: Float[Array, ""]
+) -> Float[Array, "n 4"]:
+    """Stress z/stress that has flowed away at every sample, from S_e/stress; see `NonlinearViscosity`.
+
+    A loop that reverse mode can turn round takes twice as long as one that it can't, and most predictions are never
+    differentiated: this is the plain one, and its derivatives are those of the other.
+
+    Args:
+        elapsed: time since the first sample, s; tau: of relaxation under small load, s.
+    """
+    return _integrated(diffrax.ForwardMode(), scaled, elapsed, tau, exponent)
+
+
+@flowed_away.defjvp
+def _derivative(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
+    return jax.jvp(partial(_integrated, diffrax.DirectAdjoint()), primals, tangents)
+
+
+def _integrated(adjoint: diffrax.AbstractAdjoint, scaled: Array, elapsed: Array, tau: Array, exponent: Array) -> Array:
+    n = len(elapsed)
+    # Repeated times are set apart by a billionth of a step, so that interpolation is defined; those at the end
+    # (padding) by the whole recording, where nothing is integrated.
+    end = elapsed[-1]
+    apart = 1e-9 * end / n
+    padding = jnp.arange(n) > jnp.argmax(elapsed >= end)
+    time = jnp.where(padding, 2.0 * end, elapsed) + jnp.arange(n) * apart
+    end = jnp.max(jnp.where(padding, 0.0, time))
+    rate = jnp.diff(scaled, axis=0) / jnp.diff(time)[:, None]
+    norm = jnp.array([1.0, 1.0, 1.0, 2.0], scaled.dtype)  # the shear component counts twice in S : S
+
+    def flow(t, z, _):
+        # `diffrax.LinearInterpolation` finds the interval by halving, a loop that costs more than all the rest
+        k = jnp.clip(jnp.searchsorted(time, t, method="compare_all") - 1, 0, n - 2)
+        load = scaled[k] + rate[k] * (t - time[k]) - z
+        return load / tau * (1 + load @ (norm * load)) ** ((exponent - 1) / 2)
+
+    controller = diffrax.PIDController(rtol=1e-9, atol=1e-10)
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(flow),
+        diffrax.Tsit5(),
+        time[0],
+        end,
+        None,
+        scaled[0],
+        saveat=diffrax.SaveAt(t0=True, steps=True),
+        stepsize_controller=diffrax.ClipStepSizeController(controller, step_ts=time),
+        adjoint=adjoint,
+        max_steps=16384,
+        throw=False,
+    )
+    assert solution.ts is not None  # `saveat` asks for both
+    assert solution.ys is not None
+    # Every sample ends a step, to rounding. Asked for samples, diffrax would check their times by a call back into
+    # Python, and a program that does so can't be kept on disk.
+    return solution.ys[jnp.searchsorted(solution.ts, jnp.minimum(time, end) - 0.5 * apart)]

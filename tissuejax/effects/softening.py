@@ -55,7 +55,8 @@ class Softening(Effect):
             Form("with growth", ("r", "m", "beta"), nominated=False),
             Form("with loading", ("r", "d", "m", "beta"), nominated=False),
         )
-        return Offer(cls(loading=True), forms)
+        middle = 0.1 * sizes.energy
+        return Offer(cls(loading=True), forms, ranges={"m": (0.02 * middle, 40 * middle, middle)})
 
     @classmethod
     def in_probings(cls, sizes: Probed) -> Offer:

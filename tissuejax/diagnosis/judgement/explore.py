@@ -99,9 +99,12 @@ class Exploration:
 
     @property
     def strange(self) -> bool:
-        """Whether the best set leaves a part of the discrepancy that is likelier something unknown."""
-        priors = self.scales.priors(self.criteria, self.weighed[self.best].evidence.keys)
-        return bool(np.any(priors.wider(self.weighed[self.best].v)))
+        """Whether the best set leaves a lasting part of the discrepancy that is likelier something unknown.
+
+        What happened at once is described by when it happened: no form of an effect is missing for it.
+        """
+        best, scales = self.weighed[self.best], self.scales
+        return bool(np.any(scales.priors(self.criteria, best.evidence.keys).wider(best.v) & scales.lasting))
 
     @property
     def best(self) -> frozenset:

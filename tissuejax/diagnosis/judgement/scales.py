@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.special import log_ndtr
 
 from tissuejax.diagnosis.bench import Bench, Candidate, Free
@@ -118,6 +118,11 @@ class Scales:
             return Part(name, "numerical", within=tuple(np.diag(error[r] ** 2) for r in self.blocked.rows))
         return Part(name, "numerical", error)
 
+    @property
+    def lasting(self) -> Bool[np.ndarray, " K"]:
+        """Which parts of the discrepancy are not what happened at once."""
+        return np.array([f != "sudden" for f in self.families])
+
     def priors(self, criteria: Criteria, keys: Sequence[str] = ()) -> Widths:
         """Prior of the amplitudes where the effects `keys` act.
 
@@ -131,7 +136,7 @@ class Scales:
         free = np.array([f not in named and f not in criteria.settled for f in self.families])
         partly = np.array([f not in wide and named.get(f) in acting for f in self.families])
         width = np.array([wide.get(f, criteria.shares[f]) for f in self.families])
-        sudden = np.array([f == "sudden" for f in self.families])
+        sudden = ~self.lasting
         several = max(int(np.sum(free & ~sudden)), 1)
         chance = free * criteria.unknown / several + criteria.partly * partly
         if not sudden.any():

@@ -1,8 +1,8 @@
 """The course of a search: the base, single effects, pairs and triples, and what may have happened at once.
 
-Where even the best single effect leaves a part of the discrepancy that is likelier something unknown, every effect is
-tried in all its forms. What happened at once comes in before the pairs where it describes the recordings better, beside
-the base, than any single effect does, and at the end beside the best sets.
+Where even the best single effect leaves a lasting part of the discrepancy that is likelier something unknown, every
+effect is tried in all its forms. What happened at once comes in before the pairs where it describes the recordings
+better, beside the base, than any single effect does, and at the end beside the best sets.
 
 How noise is correlated in time is read from the base's residual first. A mismatch that is as quick as the noise hides
 it there, so it is read again from what the best set leaves; where that set is likelier under it all sets are weighed

@@ -70,8 +70,7 @@ def happened(scales: Scales, at: Weighed, criteria: Criteria) -> Happening | Non
         gained = gains(scales.blocked, at.parts, v, linear, factors, criteria.sudden)
         return gained + np.log(criteria.happens(len(of.sudden)) * np.array([p.chance for p in these]))
 
-    smoothly = np.array([f != "sudden" for f in scales.families])
-    wide = tuple(int(k) for k in np.flatnonzero(widths.wider(at.v) & smoothly))
+    wide = tuple(int(k) for k in np.flatnonzero(widths.wider(at.v) & scales.lasting))
     likeliest: dict[str, tuple[float, Happening]] = {}  # each moment once, beside what it is likeliest beside
     for instead in dict.fromkeys(((), *((k,) for k in wide), wide)):
         v = narrowed(scales, at, criteria, instead)
