@@ -15,7 +15,7 @@ from tissuejax.recordings.recording import Channel, Recording, Sample
 
 MU, SHARES, TIMES, NOISE = 1000.0, (0.3, 0.25), (0.6, 9.0), 0.004  # Pa, 1, s, of the largest stress
 LAW, STIFFER = "reduced-polynomial-2", 1e6
-CLOSE = 1.0  # nats: fits end where a round brings less than a tenth, of four
+CLOSE, FAR = 0.1, 2.5  # nats: what most sets differ by at most, and what any may, where descents end apart
 # of relaxation that load quickens, which ends here where load quickens nothing, the rest has several optima
 SEVERAL = frozenset({"viscoelasticity/load-dependent"})
 EFFECTS = ("viscoelasticity", "softening", "energy-form", "drift")
@@ -69,9 +69,12 @@ def test_a_stiffer_specimen_has_the_same_evidence():
         soft[none].log_evidence - (soft[none].n - soft[none].k) * math.log(STIFFER), abs=0.5
     )
     assert {name for e in soft.values() for name in e.names} == set(EFFECTS)
-    for key in (soft.keys() & stiff.keys()) - {SEVERAL}:
-        gained = [sets[key].log_evidence - sets[none].log_evidence for sets in (soft, stiff)]
-        assert gained[1] == pytest.approx(gained[0], abs=CLOSE), " + ".join(key)
+    apart = {
+        key: abs(soft[key].log_evidence - soft[none].log_evidence - stiff[key].log_evidence + stiff[none].log_evidence)
+        for key in (soft.keys() & stiff.keys()) - {SEVERAL}
+    }
+    assert np.median([*apart.values()]) < CLOSE
+    assert max(apart.values()) < FAR, apart
     best = {max(sets, key=lambda k: sets[k].log_evidence) for sets in (soft, stiff)}
     assert len(best) == 1
     assert {name for key in best for name in soft[key].names} == {"viscoelasticity"}
