@@ -1,6 +1,7 @@
 """What happens at once: found where it was put in, no effect's business, and nothing where nothing happened."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,10 +9,13 @@ from scipy.stats import halfnorm
 from test_judgement import made
 
 from tissuejax.diagnosis.diagnose import asked_of, diagnose
+from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.effort import Effort
+from tissuejax.diagnosis.judgement.explore import Exploration
 from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.marginal import Widths, amplitudes, marginal
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
+from tissuejax.diagnosis.judgement.scales import Scales
 from tissuejax.diagnosis.judgement.search import based
 from tissuejax.diagnosis.judgement.sudden import disrupted, gains, held, known_moments
 from tissuejax.estimation.discrepancy import Part
@@ -118,6 +122,18 @@ def test_every_time_is_scanned_first_or_lies_beside_one_that_is():
     assert sum(m.chance for m in every) == pytest.approx(0.5)
     found = {m.name for f in first for m in (f, *timed.near(f))}
     assert found == {m.name for m in every}
+
+
+@pytest.mark.parametrize(("v", "strange"), [((0.001, 0.0), False), ((0.001, 0.2), False), ((0.6, 0.0), True)])
+def test_what_happened_at_once_calls_for_no_other_form(v, strange):
+    """A rest that lasts may be a law in another form than those tried; a step at a time that is known may not."""
+    evidence = SimpleNamespace(keys=(), void=False, log_evidence=-math.inf)
+    criteria, weighed = Criteria(), SimpleNamespace(evidence=evidence, v=np.square(v))
+    scales = Scales(SimpleNamespace(candidates={}), None, ("law", "sudden"), None, None, {}, np.zeros(1), 1.0)
+    scales.moments = (0.01,)
+    assert scales.lasting.tolist() == [True, False]
+    e = Exploration(SimpleNamespace(), criteria, Effort(), scales, weighed={frozenset(): weighed})
+    assert e.strange == strange
 
 
 def recorded(disturbed) -> Sample:
