@@ -80,22 +80,30 @@ class Exploration:
         known = self.bench.candidates
         return frozenset(k if known[k].widens else known[k].name for k in key)
 
-    def ranked(self, size: int) -> list[frozenset]:
-        """The best form of every set of `size` effects, best first."""
+    def ranked(self, size: int, apart: bool = False) -> list[frozenset]:
+        """The best form of every set of `size` effects, best first.
+
+        Args:
+            apart: the best with and the best without what only widens the discrepancy, where a set has both.
+        """
         found: dict[frozenset, frozenset] = {}
         for key in sorted((k for k in self.weighed if len(k) == size), key=self.worth)[::-1]:
             if self.worth(key) > -math.inf:
-                found.setdefault(self.names(key), key)
+                wide = frozenset(k for k in key if apart and self.bench.candidates[k].widens)
+                found.setdefault(self.names(key) | wide, key)
         return list(found.values())
 
-    def near(self, size: int) -> list[frozenset]:
+    def near(self, size: int, apart: bool = False) -> list[frozenset]:
         """Those of `ranked` that other forms may bring to the top."""
         top = self.worth(self.best)
-        return [k for k in self.ranked(size) if self.worth(k) > top - self.effort.hopeful]
+        return [k for k in self.ranked(size, apart) if self.worth(k) > top - self.effort.hopeful]
 
     def parents(self, size: int) -> list[frozenset]:
-        """Sets to grow: those near the top; all of `ranked` as long as the best one leaves more than is usual."""
-        return self.ranked(size) if self.strange else self.near(size)
+        """Sets to grow: those near the top; all of `ranked` as long as the best one leaves more than is usual.
+
+        A law that is anything smooth takes up what a second effect does, beside one of a few terms it stands out.
+        """
+        return self.ranked(size, apart=True) if self.strange else self.near(size, apart=True)
 
     @property
     def strange(self) -> bool:
