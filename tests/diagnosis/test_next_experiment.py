@@ -86,7 +86,9 @@ def test_a_pull_across_tells_fibres_along_the_pull_from_a_stiffer_energy(pulled)
     """Along the fibres both raise the force; across them only the energy does."""
     law = energy("neo-hookean")
     bench = MaterialBench.of(pulled, law, ("pull",), (), {"pull": 5.0}, ["anisotropy", "energy-form"])
-    start = {"effects.anisotropy.k1": 100.0, "effects.anisotropy.angle": 0.1, "effects.anisotropy.k2": 1.0}
+    # from the isotropic fit's modulus a descent stalls in the valley between modulus and fibres, at twice the noise
+    start = {"energy.mu": 1000.0, "effects.anisotropy.k1": 100.0, "effects.anisotropy.k2": 1.0}
+    start["effects.anisotropy.angle"] = 0.1
     fibres = refit(bench, white(bench), ("anisotropy/in the xy plane",), start)
     form = refit(bench, white(bench), ("energy-form/all",), {"effects.energy-form.C30": 100.0})
     for fit in (fibres, form):
