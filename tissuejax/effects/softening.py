@@ -53,7 +53,7 @@ class Softening(Effect):
         forms = (
             Form("", ("r", "m"), {"m": tuple(sizes.energy * x for x in (0.02, 0.1, 0.4))}),
             Form("with growth", ("r", "m", "beta"), nominated=False),
-            Form("with loading", ("r", "d", "m", "beta"), nominated=False),
+            Form("with loading", ("r", "d", "m", "beta")),
         )
         middle = 0.1 * sizes.energy
         return Offer(cls(loading=True), forms, ranges={"m": (0.02 * middle, 40 * middle, middle)})

@@ -1,8 +1,9 @@
 """The course of a search: the base, single effects, pairs and triples, and what may have happened at once.
 
-Where even the best single effect leaves a lasting part of the discrepancy that is likelier something unknown, every
-effect is tried in all its forms. What happened at once comes in before the pairs where it describes the recordings
-better, beside the base, than any single effect does, and at the end beside the best sets.
+Every single effect that is likelier than none is tried in all its forms; every effect at all where even the best one
+leaves a lasting part of the discrepancy that is likelier something unknown. What happened at once comes in before the
+pairs where it describes the recordings better, beside the base, than any single effect does, and at the end beside the
+best sets.
 
 How noise is correlated in time is read from the base's residual first. A mismatch that is as quick as the noise hides
 it there, so it is read again from what the best set leaves; where that set is likelier under it all sets are weighed
@@ -78,7 +79,7 @@ def noise_beside(e: Exploration) -> Blocked | None:
     if noise.noise is None and old.noise is None:
         return None
     start = Start(best.begun, best.v, at=best.refit.values)
-    again = e.kept.weigh(replace(e.scales, blocked=noise), best.evidence.keys, start, e.criteria, e.effort.course)
+    again = e.kept.follow(replace(e.scales, blocked=noise), best.evidence.keys, start, e.criteria, e.effort.course)
     return noise if again.evidence.log_evidence - best.evidence.log_evidence > GAIN / 2 else None
 
 
@@ -166,9 +167,10 @@ def alone(
     e.extend([frozenset()], effort.singles, effort.singles)
     for key in e.near(1)[: effort.reshaped[0]]:
         e.reshape(key)
-    if e.strange and not bench.costly:
+    if not bench.costly:
         # a law unlike an effect's plain form leaves that form far behind, where no form near the top leads to it
         for key in e.ranked(1):
-            e.reshape(key)
+            if e.strange or e.worth(key) > e.worth(frozenset()):
+                e.reshape(key)
     e.settle(1)
     return e
