@@ -77,6 +77,18 @@ def test_where_fibres_bear_at_a_shape_scanned_they_have_the_size_of_that(bench):
     assert at == on.effect_size(bench.candidates["fibres"], {"fibre.onset": 0.1}, Criteria())
 
 
+def test_how_large_an_effect_may_be_goes_by_its_shape_where_the_fit_rests(bench):
+    """Fibres that bear from the start do three times as much, for one stiffness, as fibres that bear late."""
+    on, base = scales(bench)
+    early, late = (on.effect_size(FIBRES, {"fibre.onset": x}, Criteria())["fibre.k"] for x in (0.01, 0.6))
+    assert late > 3 * early
+    at = {**base.refit.values, "fibre.k": 3.0, "fibre.onset": 0.3}
+    starts = [Start({**at, "fibre.onset": x}, at=at) for x in (0.01, 0.3, 0.6)]
+    still = Course(rounds=1, iterations=0)
+    found = [weigh(on, ("fibres",), s, Criteria(), still).evidence.log_evidence for s in starts]
+    assert found == pytest.approx([found[1]] * 3, abs=1e-6)
+
+
 def test_a_parameter_of_the_base_that_does_nothing_is_left_alone(bench):
     _, base = scales(bench)
     bench.base = (*bench.base, "base.k")

@@ -144,20 +144,50 @@ class Exploration:
             self.exhausted = True
             return None
         self.tell("weighing", order)
-        begin = [Start(s, v, bench) for s in starts]
-        if len(begin) > 1:
-            short = replace(effort.course, rounds=1, iterations=effort.trial)
-            tried = [self.kept.weigh(self.scales, order, s, self.criteria, short) for s in begin]
-            first = max(tried, key=lambda w: w.evidence.log_evidence)
-            if first.refit.values:
-                begin = [Start(first.refit.values, first.v if v is None else v, bench)]
         floor = self.weighed[self.best].evidence.log_evidence - effort.given_up
         course = replace(self._course, floor=floor, anchor=not self.bench.costly)
-        found = self.kept.weigh(self.scales, order, begin[0], self.criteria, course)
+        begin = [Start(s, v, bench) for s in starts]
+        found = self._descended(order, begin, course)
+        if (inside := self._inside(order, found)) is not None:
+            added = [self.bench.candidates[k] for k in order if k not in inside.evidence.keys]
+            idle = {a: self.bench.start[a] for c in added for a in c.amplitudes}
+            within = Start({**begin[0].values, **inside.refit.values, **idle}, inside.v, inside.bench)
+            again = self.kept.follow(self.scales, order, within, self.criteria, course)
+            found = max(found, again, key=lambda w: w.evidence.log_evidence)
         old = self.weighed.get(key)
         if old is None or found.evidence.log_evidence > old.evidence.log_evidence:
             self.weighed[key] = found
         return self.weighed[key]
+
+    def _descended(self, order: Sequence[str], begin: Sequence[Start], course: Course) -> Weighed:
+        """The best of several starts: each is tried for a round, and what has come near the best of them is followed,
+        each place once; where predictions are costly the best alone."""
+        if len(begin) == 1:
+            return self.kept.weigh(self.scales, order, begin[0], self.criteria, course)
+        short = replace(self.effort.course, rounds=1, iterations=self.effort.trial)
+        tried = [(self.kept.weigh(self.scales, order, s, self.criteria, short), s) for s in begin]
+        tried.sort(key=lambda t: -t[0].evidence.log_evidence)
+        there = [w.evidence.log_evidence for w, _ in tried]
+        ends = [] if self.bench.costly else [w for w, _ in tried]
+        for i, (w, s) in enumerate(tried[:1] if self.bench.costly else tried):
+            known = any(x - there[i] < course.settled for x in there[:i])  # the same place again
+            if i and (known or there[0] - there[i] > self.effort.hopeful):
+                continue
+            start = Start(w.refit.values, w.v if s.v is None else s.v, s.bench) if w.refit.values else s
+            ends.append(self.kept.weigh(self.scales, order, start, self.criteria, course))
+        return max(ends, key=lambda w: w.evidence.log_evidence)
+
+    def _inside(self, order: Sequence[str], found: Weighed) -> Weighed | None:
+        """The best set with one effect less where this one came to rest far below it, though it has that one's fit in
+        itself: its descent ended elsewhere. None of what is far from the best set anyway."""
+        key, sets = frozenset(order), self.weighed
+        less = [sets[key - {k}] for k in order if key - {k} in sets]
+        if not less or self.bench.costly:
+            return None
+        inside = max(less, key=lambda w: w.evidence.log_evidence)
+        there = inside.evidence.log_evidence
+        astray = found.evidence.log_evidence < there - self.effort.hopeful
+        return inside if astray and there > sets[self.best].evidence.log_evidence - self.effort.given_up else None
 
     @property
     def _course(self) -> Course:

@@ -59,6 +59,15 @@ class Kept:
             self._write()
         return found
 
+    def follow(self, scales: Scales, keys: Sequence[str], start: Start, criteria: Criteria, course: Course) -> Weighed:
+        """A set from a place where one came to rest: the better of what it is there and where it leads from there.
+
+        Parts of the discrepancy move with the prediction: a fit beside those of its start may lead away.
+        """
+        still = replace(course, rounds=1, iterations=0, floor=-math.inf)
+        tried = [self.weigh(scales, keys, start, criteria, c) for c in (still, course)]
+        return max(tried, key=lambda w: w.evidence.log_evidence)
+
     def forget(self) -> None:
         """The search is finished: remove the file, and its folder if nothing else is in it."""
         if self.path is not None:

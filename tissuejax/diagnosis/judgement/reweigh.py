@@ -15,15 +15,14 @@ from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.judgement.coloured import shown
 from tissuejax.diagnosis.judgement.criteria import Criteria
-from tissuejax.diagnosis.judgement.effort import Course, Effort
+from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.explore import Exploration
 from tissuejax.diagnosis.judgement.judge import left
 from tissuejax.diagnosis.judgement.kept import Kept
-from tissuejax.diagnosis.judgement.scales import Scales
 from tissuejax.diagnosis.judgement.search import based, rooted
 from tissuejax.diagnosis.judgement.sudden import joined, known_moments
-from tissuejax.diagnosis.judgement.weigh import Start, Weighed, weigh
+from tissuejax.diagnosis.judgement.weigh import Start, Weighed
 from tissuejax.errors import InputError
 from tissuejax.estimation.discrepancy import Discrepancy
 
@@ -133,18 +132,10 @@ def reweighed(
         if name not in known:
             raise InputError(f"{name}: no longer one of the moments that are scanned; search again")
         scales = joined(scales, known[name])
-    first = _followed(scales, base, criteria, course)
+    kept = Kept()
+    first = kept.follow(scales, base.keys, base.start(), criteria, course)
     rooted(scales, first, bench.free)
     sets = [first.evidence]
-    for s in others:
-        sets.append(_followed(scales, s, criteria, course).evidence)
+    sets += [kept.follow(scales, s.keys, s.start(), criteria, course).evidence for s in others]
     fitted = tuple(n for n in bench.fitted if n not in found.held_out)
     return Evidence(tuple(sets), bench.forms, fitted, found.held_out, faults=bench.faults)
-
-
-def _followed(scales: Scales, s: Rested, criteria: Criteria, course: Course) -> Weighed:
-    """A set where it rests, and from there on; the better of both, as a search keeps it. The first fit of a set leaves
-    out what laws of effects err by, and may lead away from there."""
-    still = replace(course, rounds=1, iterations=0)
-    tried = [weigh(scales, s.keys, s.start(), criteria, c) for c in (still, course)]
-    return max(tried, key=lambda w: w.evidence.log_evidence)

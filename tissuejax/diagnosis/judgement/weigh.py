@@ -2,8 +2,9 @@
 
 Parameters of the base have flat priors, the same in every set. An effect's amplitude has a normal prior about neutral,
 one-sided where the effect is; its width is in terms of what it does: the amplitude that changes the stress by
-`Criteria.change` of it, or `Criteria.rig` (derivative at neutral, at the base fit). So one number serves gaps, moduli
-and rates; an effect that only corrects what was noted says itself how far that may be wrong (`Effect.misjudged`).
+`Criteria.change` of it, or `Criteria.rig` (derivative at neutral, at the base fit, with the shapes where the fit rests;
+of simulations with those where it began). So one number serves gaps, moduli and rates; an effect that only corrects
+what was noted says itself how far that may be wrong (`Effect.misjudged`).
 Positive shapes have normal priors of their logarithms. Fit and amplitudes of the discrepancy are found in turn.
 """
 
@@ -49,7 +50,7 @@ class Weighed:
         rest: the discrepancy's posterior mean over the blocks, Pa.
         bench: that it was weighed on; `settled`: whether its predictions are exact at the fit.
         linear: the problem about the fit; None of an impossible set.
-        begun: values at which it began, by which the priors of its amplitudes go.
+        begun: values at which it began, by which the priors of its amplitudes go at first.
     """
 
     evidence: SetEvidence
@@ -104,7 +105,7 @@ class Start:
     """Where the weighing of a set begins.
 
     Attributes:
-        values: parameters, by which the priors of the amplitudes go too.
+        values: parameters, by which the priors of the amplitudes go at first.
         v: squared amplitudes of the discrepancy; of their prior's size by default.
         bench: where a cheap simulation is corrected, with the correction to begin with; that of the base by default.
         at: where the fit begins, if not at `values`.
@@ -133,11 +134,16 @@ def weigh(
     y, best = scales.cut.mean(bench.y), None
     at, tolerance, raw = dict(start.at or start.values), course.first, None
     bench = bench.anchored(at) if course.anchor else bench.nearer(at)
-    parts = scales.about(bench.predict(at), bench, keys, at)
-    # what laws of effects err by lies across the slopes at a fit, and before the first there are none
-    exact = np.where([f == "effect" for f in scales.families], 0.0, v)
+    shaped = not bench.costly and any(bench.candidates[k].shapes for k in keys)
+    errs = np.array([f == "effect" for f in scales.families])
+    if anew or bench.costly or not np.any(v[errs]):
+        parts = scales.about(bench.predict(at), bench, keys, at)
+    else:
+        parts, raw = _resumed(scales, bench, keys, at, faults)
     for turn in range(course.rounds):
-        misfit = Whitening(bench, scales.cut, scales.blocked, parts, v if turn else exact)
+        # what laws of effects err by lies across the slopes at a fit, and before the first there are none
+        known = v if turn or raw is not None else np.where(errs, 0.0, v)
+        misfit = Whitening(bench, scales.cut, scales.blocked, parts, known)
         seed = None if raw is None or bench.costly else misfit.whiten_means(raw)
         fit = refit(bench, misfit, keys, at, iterations=course.iterations, tolerance=tolerance, errors=False, seed=seed)
         if not np.isfinite(fit.chi2):
@@ -146,6 +152,8 @@ def weigh(
             bench, fit = anchored(bench, fit, at, course.shortened)
         if not np.max(np.abs(fit.prediction)) < WILD * scales.peak:
             break  # shares of it would cover all that was measured
+        if shaped:
+            bench, priors = with_priors(scales, keys, fit.values, criteria, bench)
         descent = Descent(bench, misfit, tuple(fit.values), names, {})
         x = descent.point(fit.values)
         resting = descent.resting(x)
@@ -199,6 +207,18 @@ def weigh(
     if best is None:
         return _impossible(scales, keys)
     return replace(_described(scales, keys, best, criteria), settled=course.anchor, begun=dict(start.values))
+
+
+def _resumed(
+    scales: Scales, bench: Bench, keys: Sequence[str], at: Mapping[str, float], faults: frozenset[str] | set[str]
+) -> tuple[tuple[Part, ...], np.ndarray]:
+    """The parts about a place that a set came to rest at before, and the slopes there, means over blocks."""
+    paths = tuple(dict.fromkeys([*bench.base, *(p for k in keys for p in bench.candidates[k].paths)]))
+    values = {p: at.get(p, bench.start[p]) for p in paths}
+    prediction, raw = bench.predict(values), scales.cut.mean(bench.jacobian(values, paths, bench.fitted))
+    if not np.isfinite(squared(raw)):
+        return scales.about(prediction, bench, keys, at), None
+    return scales.about(prediction, bench, keys, values, raw[:, [p not in faults for p in paths]]), raw
 
 
 def _amplitudes(

@@ -41,7 +41,7 @@ class Whitening:
             u = smooth(self.parts, self.v)
             light = [solve_triangular(c, u[r], lower=True, check_finite=False) for c, r in zip(lower, rows)]
             a, s, _ = np.linalg.svd(np.concatenate(light), full_matrices=False)
-            self._roots[recordings] = lower, rows, a, 1 - 1 / np.sqrt(1 + s**2)
+            self._roots[recordings] = lower, rows, a, 1 - 1 / np.hypot(1.0, s)
         return self._roots[recordings]
 
     def whiten(self, x: Float[np.ndarray, "N ..."], recordings: Sequence[str]) -> Float[np.ndarray, "M ..."]:
