@@ -51,9 +51,9 @@ class Effort:
         trial: iterations of a fit that only compares starts. Ground: cost.
         least: nats that the linear step of a single effect has to promise. Ground: less than its share of the prior
             can bring back; negative, for a step is short where a gap or a frequency leads far.
-        hopeful: nats below the best set up to which other forms and further effects of a set are tried, and below a set
-            inside it up to which a descent is believed. Ground: what another form gains, seldom more; one in three
-            thousand.
+        hopeful: nats below the best set up to which other forms and further effects of a set are tried, below the best
+            start up to which another one is followed, and below a set inside it up to which a descent is believed.
+            Ground: what another form gains, seldom more; one in three thousand.
         given_up: nats below the best set at which a set is not followed to the end of its fit. Ground: a later round
             brings back less.
         promised: times the gain of a linear step that a set may gain, where predictions are costly. Ground: fits gained

@@ -210,9 +210,10 @@ def weigh(
 
 
 def _resumed(
-    scales: Scales, bench: Bench, keys: Sequence[str], at: Mapping[str, float], faults: frozenset[str] | set[str]
-) -> tuple[tuple[Part, ...], np.ndarray]:
-    """The parts about a place that a set came to rest at before, and the slopes there, means over blocks."""
+    scales: Scales, bench: Bench, keys: Sequence[str], at: Mapping[str, float], faults: set[str]
+) -> tuple[tuple[Part, ...], np.ndarray | None]:
+    """The parts about a place that a set came to rest at before, and the slopes there, means over blocks; None where
+    they are beyond all numbers."""
     paths = tuple(dict.fromkeys([*bench.base, *(p for k in keys for p in bench.candidates[k].paths)]))
     values = {p: at.get(p, bench.start[p]) for p in paths}
     prediction, raw = bench.predict(values), scales.cut.mean(bench.jacobian(values, paths, bench.fitted))
