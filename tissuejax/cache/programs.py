@@ -129,7 +129,9 @@ class Kept:
         self._program(tree, leaves)
 
     def _program(self, tree: Any, leaves: list) -> Callable:
-        key = (tree, tuple((np.shape(x), np.result_type(x).str) for x in leaves))
+        # asking NumPy for shape and type of what has them takes as long as a short program
+        arrays = (x if isinstance(x, np.ndarray | jax.Array) else np.asarray(x) for x in leaves)
+        key = (tree, tuple([(x.shape, x.dtype) for x in arrays]))
         with self._asking:
             promised = self._known.get(key)
             mine = promised is None

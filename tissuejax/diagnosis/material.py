@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import ClassVar
 
+import jax
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -79,12 +80,13 @@ def lengthened(test: MaterialTest, n: int) -> MaterialTest:
 def lengths(samples: Sequence[int]) -> list[int]:
     """To how many samples recordings of a sample are lengthened: few lengths, few compilations.
 
-    The longest to the next of 128, 192, 256, 384, 512, ..., the others to that or a quarter, a sixteenth, ... of it:
-    a program for another length takes as long to compile as it takes to run thousands of times.
+    The longest to the next of 128, 192, 256, 384, 512, ..., the others to that or a half, a quarter, ... of it: a
+    program for another length takes as long to compile as it takes to run thousands of times, and a search runs it
+    some thousand times.
     """
     power = max(SHORTEST, 2 ** math.ceil(math.log2(max(samples))))
     top = 3 * power // 4 if power > SHORTEST and max(samples) <= 3 * power // 4 else power
-    steps = [top >> k for k in range(0, top.bit_length(), 2) if k == 0 or (top >> k) >= SHORTEST]
+    steps = [top >> k for k in range(top.bit_length()) if k == 0 or (top >> k) >= SHORTEST]
     return [min(step for step in steps if step >= n) for n in samples]
 
 
@@ -132,6 +134,7 @@ class MaterialBench(Bench):
             estimated=not any(sample.recordings[n].channels[STRESS_CHANNEL].noise_std for n in fitted),
         )
         bench._tests = tests
+        bench._given = {n: jax.device_put(t) for n, t in tests.items()}  # once, and not at every prediction
         bench._of = {n: [s for s in segments if s.recording == n] for n in recordings}
         strain = max(float(np.max(np.abs(np.log(s.drive) if s.drive_name == "stretch" else s.drive))) for s in segments)
         top = bench._top = float(np.quantile(np.abs(bench.y), 0.98))
@@ -273,7 +276,7 @@ class MaterialBench(Bench):
         """Predictions of recordings; NaN where the faces of a specimen could not be found at such parameters. All are
         begun before the first is waited for: they run beside each other where there are cores."""
         self.spent += sum(program.price for program, _, _ in runs)
-        begun = [self._found(lambda p=p, t=t, n=n: p.run(t, self._tests[n]), n) for p, t, n in runs]
+        begun = [self._found(lambda p=p, t=t, n=n: p.run(t, self._given[n]), n) for p, t, n in runs]
         return [self._found(lambda y=y: np.asarray(y), name) for y, (_, _, name) in zip(begun, runs, strict=True)]
 
     def _found(self, get: Callable[[], Array | np.ndarray], name: str) -> Array | np.ndarray:

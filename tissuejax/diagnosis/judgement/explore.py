@@ -161,7 +161,7 @@ class Exploration:
 
     def _descended(self, order: Sequence[str], begin: Sequence[Start], course: Course) -> Weighed:
         """The best of several starts: each is tried for a round, and what has come near the best of them is followed,
-        each place once; where predictions are costly the best alone."""
+        each place once; the best alone where that ends far below the best set, or predictions are costly."""
         if len(begin) == 1:
             return self.kept.weigh(self.scales, order, begin[0], self.criteria, course)
         short = replace(self.effort.course, rounds=1, iterations=self.effort.trial)
@@ -171,7 +171,8 @@ class Exploration:
         ends = [] if self.bench.costly else [w for w, _ in tried]
         for i, (w, s) in enumerate(tried[:1] if self.bench.costly else tried):
             known = any(x - there[i] < course.settled for x in there[:i])  # the same place again
-            if i and (known or there[0] - there[i] > self.effort.hopeful):
+            hopeless = i and ends[-1].evidence.log_evidence < course.floor
+            if i and (known or hopeless or there[0] - there[i] > self.effort.hopeful):
                 continue
             start = Start(w.refit.values, w.v if s.v is None else s.v, s.bench) if w.refit.values else s
             ends.append(self.kept.weigh(self.scales, order, start, self.criteria, course))
@@ -321,10 +322,11 @@ class Exploration:
         }
 
     def reshape(self, key: frozenset) -> None:
-        """Weigh a set in the other forms of its effects, from form to neighbouring form as long as that gains."""
+        """Weigh a set in the other forms of its effects, from form to neighbouring form as long as that gains; from one
+        start alone if it is far below the best set."""
         at = None
         while at != (at := max((k for k in self.weighed if self.same(k, key)), key=self.worth)):
-            parent = self.weighed[at]
+            parent, far = self.weighed[at], self.worth(at) < self.worth(self.best) - self.effort.given_up
             for old in parent.evidence.keys:
                 for new in self.bench.candidates[old].beside:
                     order = tuple(new if k == old else k for k in parent.evidence.keys)
@@ -332,7 +334,7 @@ class Exploration:
                     if known or (len(order) > 1 and self.lost(new)):
                         continue
                     starts = [{**parent.refit.values, **s} for s in self.bench.candidates[new].grid]
-                    most = self.effort.starts + 1 if len(order) == 1 else self.effort.starts
+                    most = 1 if far else self.effort.starts + (len(order) == 1)
                     self.weigh(order, starts[:most], bench=parent.bench)
 
     def lost(self, form: str) -> bool:
