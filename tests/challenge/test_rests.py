@@ -1,6 +1,7 @@
 """Rests: every law against what it claims, and the sizes, places and noise of whole cases by independent numbers."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -184,6 +185,25 @@ def test_size_of_the_rest_and_what_was_tried():
     assert m.tried is True
     assert mark_rest("s", key(("slack",)), said("unexplained", sets=[{"effects": ["drift/linear"]}])).tried is False
     assert mark_rest("s", key(("slack",)), said("unexplained"), kept=8.0).kept_ratio == pytest.approx(2.0)
+
+
+def test_size_of_the_rest_beside_the_true_effects_whatever_was_named():
+    """Peak 100 Pa: 2 Pa of rest are stated at 0.02 of it, beside slack alone there are 9 Pa."""
+    answer = said("found", "slack", "hysteresis", rest={"rms": 2.0, "share_of_peak": 0.02})
+    rows = [
+        ({"slack", "hysteresis"}, -10.0, 0.02),
+        ({"slack"}, -30.0, 0.05),
+        ({"slack"}, -20.0, 0.09),  # another form, likelier
+        ({"slack"}, -math.inf, 0.01),  # can't be predicted
+        (set(), -90.0, 0.5),
+    ]
+    evidence = {"sets": [{"names": sorted(n), "log_evidence": e, "rest": [x**2, 0.0]} for n, e, x in rows]}
+    m = mark_rest("s", key(("slack",), ["hysteresis"]), answer, evidence=evidence)
+    assert m.rest_over_true == pytest.approx(0.2)
+    assert m.beside_true == pytest.approx(0.9)
+    untried = mark_rest("s", key(("drift",)), answer, evidence=evidence)
+    assert np.isnan(untried.beside_true)
+    assert np.isnan(mark_rest("s", key(("slack",)), answer).beside_true)
 
 
 def test_probings_keep_no_recording_back_and_are_graded():

@@ -36,7 +36,9 @@ def marks_in(folder: Path, keys: dict) -> list[RestMark]:
             said = np.array(json.loads(predicted.read_text())["nominal_stress"], float)
             true = np.load(folder / "sealed" / "kept" / f"{name}.npy")
             kept = float(np.sqrt(np.mean((said - true) ** 2))) if said.shape == true.shape else math.nan
-        found.append(mark_rest(name, key, json.loads(path.read_text()), seconds, kept))
+        weighed = path.with_name("evidence.json")
+        evidence = json.loads(weighed.read_text()) if weighed.exists() else None
+        found.append(mark_rest(name, key, json.loads(path.read_text()), seconds, kept, evidence))
     if not found:
         raise InputError(f"{folder} holds no results; run it first with `tissuejax challenge run {folder}`")
     return found
@@ -64,6 +66,9 @@ def summary(marks: list[RestMark]) -> dict:
             [m for m in marks if math.isfinite(m.rest_over_true)],
             lambda m: 1 / FACTOR <= m.rest_over_true <= FACTOR,
         ),
+        f"size of the rest beside exactly the true effects within a factor {FACTOR:g}": rate(
+            [m for m in marks if math.isfinite(m.beside_true)], lambda m: 1 / FACTOR <= m.beside_true <= FACTOR
+        ),
         "diagnosis failed": rate(marks, lambda m: m.verdict == "failed"),
     }  # fmt: skip
     by_ratio = [
@@ -83,6 +88,7 @@ def summary(marks: list[RestMark]) -> dict:
         "where_f1": f1(m.where for m in marks),
         "channel_f1": channel_f1([m.channels for m in marks]),
         "rest_over_true": spread([m.rest_over_true for m in marks if math.isfinite(m.rest_over_true)]),
+        "rest_beside_true_effects_over_true": spread([m.beside_true for m in marks if math.isfinite(m.beside_true)]),
         "kept_error_over_rest": spread([m.kept_ratio for m in marks if math.isfinite(m.kept_ratio)]),
         "calibration": calibration(marks),
         "seconds": spread([m.seconds for m in marks if math.isfinite(m.seconds)]),

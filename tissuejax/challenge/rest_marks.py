@@ -27,7 +27,10 @@ class RestMark:
         apt: whether the answer as such is true: for "ambiguous" the truth is among those offered, for "unexplained" and
             "nothing-missing" no effect of the catalogue acts, for a name given it is true; what confidence is about.
         tried: whether a set with exactly these effects was fitted; None where the result doesn't list its sets.
-        rest_over_true: stated size of the rest over the true one, rms; nan where none is stated.
+        rest_over_true: stated size of the rest over the true one, rms; nan where none is stated. What of the rest has
+            been given a name, true as it may be, is not in what is stated.
+        beside_true: the same of what was weighed beside exactly the true effects, whatever the answer; nan where that
+            set was not weighed.
         where: (right, false, missed) places, recordings and phases together.
         channels: the same of a probing's channels; None where the key names none.
         confidence: as stated, or nan.
@@ -50,6 +53,7 @@ class RestMark:
     apt: bool
     tried: bool | None
     rest_over_true: float
+    beside_true: float
     where: tuple[int, int, int]
     channels: tuple[int, int, int] | None
     confidence: float
@@ -67,17 +71,41 @@ def rest_size(result: dict) -> float:
     return float(value) if isinstance(value, int | float) else math.nan
 
 
+def rest_beside(truth: tuple[str, ...], result: dict, evidence: dict | None) -> float:
+    """Rms of the rest that was weighed beside exactly these effects, in the likeliest of their forms, in the unit of
+    what was measured; nan where that set was not weighed, or its unit can't be known."""
+    said, size = result.get("rest"), rest_size(result)
+    share = said.get("share_of_peak") if isinstance(said, dict) else None
+    sets = [s for s in (evidence or {}).get("sets", ()) if set(s["names"]) == set(truth) and _known(s["log_evidence"])]
+    if not sets or not share or not math.isfinite(size):
+        return math.nan
+    likeliest = max(sets, key=lambda s: s["log_evidence"])
+    return math.sqrt(max(likeliest["rest"][0], 0.0)) * size / share
+
+
+def _known(x: object) -> bool:
+    return isinstance(x, int | float) and math.isfinite(x)
+
+
 def true_size(key: dict) -> float:
     """Rms of the true rest beyond what the told energy can swallow, over all samples in the file, Pa."""
     squares = sum(key["rest"]["beyond_rms"][n] ** 2 * k for n, k in key["samples"].items())
     return math.sqrt(squares / sum(key["samples"].values()))
 
 
-def mark_rest(name: str, key: dict, result: dict, seconds: float = math.nan, kept: float = math.nan) -> RestMark:
+def mark_rest(
+    name: str,
+    key: dict,
+    result: dict,
+    seconds: float = math.nan,
+    kept: float = math.nan,
+    evidence: dict | None = None,
+) -> RestMark:
     """Compare an answer with the key.
 
     Args:
         kept: rms error of the prediction of the recording kept back, Pa.
+        evidence: of all sets that were weighed, as a result keeps it; None where it doesn't.
     """
     truth, verdict = tuple(key["effects"]), str(result.get("verdict"))
     named = names_in(result.get("effects")) if verdict in SETTLED else ()
@@ -109,6 +137,7 @@ def mark_rest(name: str, key: dict, result: dict, seconds: float = math.nan, kep
         apt=apt,
         tried=tried(truth, result),
         rest_over_true=rest_size(result) / true_size(key),
+        beside_true=rest_beside(truth, result, evidence) / true_size(key),
         where=(a[0] + b[0], a[1] + b[1], a[2] + b[2]),
         channels=channels_found(key, result),
         confidence=float(confidence) if isinstance(confidence, int | float) else math.nan,
