@@ -322,11 +322,10 @@ class Exploration:
         }
 
     def reshape(self, key: frozenset) -> None:
-        """Weigh a set in the other forms of its effects, from form to neighbouring form as long as that gains; from one
-        start alone if it is far below the best set."""
+        """Weigh a set in the other forms of its effects, from form to neighbouring form as long as that gains."""
         at = None
         while at != (at := max((k for k in self.weighed if self.same(k, key)), key=self.worth)):
-            parent, far = self.weighed[at], self.worth(at) < self.worth(self.best) - self.effort.given_up
+            parent = self.weighed[at]
             for old in parent.evidence.keys:
                 for new in self.bench.candidates[old].beside:
                     order = tuple(new if k == old else k for k in parent.evidence.keys)
@@ -334,7 +333,7 @@ class Exploration:
                     if known or (len(order) > 1 and self.lost(new)):
                         continue
                     starts = [{**parent.refit.values, **s} for s in self.bench.candidates[new].grid]
-                    most = 1 if far else self.effort.starts + (len(order) == 1)
+                    most = self.effort.starts + (len(order) == 1)
                     self.weigh(order, starts[:most], bench=parent.bench)
 
     def lost(self, form: str) -> bool:

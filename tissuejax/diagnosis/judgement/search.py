@@ -93,10 +93,8 @@ def searched(
     kept: Kept,
 ) -> Exploration:
     """The sets that are worth it, weighed under the noise of these scales."""
-    e = singles(bench, scales, base, criteria, effort, report, kept)
+    e = alone(bench, scales, base, criteria, effort, report, kept)
     scales, disturbed = disrupted(scales, base, criteria, effort.course)
-    if e.log_worth(disturbed) < e.worth(e.best) + effort.given_up:  # else no other form comes near it
-        formed(e)
     if e.log_worth(disturbed) > e.worth(e.best):  # better than any single effect: all of them beside what happened
         e = alone(bench, scales, disturbed, criteria, effort, report, kept)
     if bench.costly:  # one start was all that the base had
@@ -152,38 +150,6 @@ def rooted(scales: Scales, base: Weighed, free: Mapping[str, Free]) -> None:
     scales.bench.free = dict(free)  # without the priors of a set
 
 
-def singles(
-    bench: Bench,
-    scales: Scales,
-    base: Weighed,
-    criteria: Criteria,
-    effort: Effort,
-    report: Report = None,
-    kept: Kept | None = None,
-) -> Exploration:
-    """An exploration with the base and the likeliest form of every single effect weighed."""
-    rooted(scales, base, bench.free)
-    e = Exploration(
-        scales.bench, criteria, effort, scales, report or (lambda _: None), {frozenset(): base}, kept=kept or Kept()
-    )
-    e.extend([frozenset()], effort.singles, effort.singles)
-    return e
-
-
-def formed(e: Exploration) -> Exploration:
-    """The same with other forms of the single effects weighed: of those near the top, and of what is likelier than
-    nothing; of all where much is left."""
-    for key in e.near(1)[: e.effort.reshaped[0]]:
-        e.reshape(key)
-    if not e.bench.costly:
-        # a law unlike an effect's plain form leaves that form far behind, where no form near the top leads to it
-        for key in e.ranked(1):
-            if e.strange or e.worth(key) > e.worth(frozenset()):
-                e.reshape(key)
-    e.settle(1)
-    return e
-
-
 def alone(
     bench: Bench,
     scales: Scales,
@@ -193,5 +159,18 @@ def alone(
     report: Report = None,
     kept: Kept | None = None,
 ) -> Exploration:
-    """An exploration with the base and all single effects weighed, in all forms that are worth it."""
-    return formed(singles(bench, scales, base, criteria, effort, report, kept))
+    """An exploration with the base and all single effects weighed."""
+    rooted(scales, base, bench.free)
+    e = Exploration(
+        scales.bench, criteria, effort, scales, report or (lambda _: None), {frozenset(): base}, kept=kept or Kept()
+    )
+    e.extend([frozenset()], effort.singles, effort.singles)
+    for key in e.near(1)[: effort.reshaped[0]]:
+        e.reshape(key)
+    if not bench.costly:
+        # a law unlike an effect's plain form leaves that form far behind, where no form near the top leads to it
+        for key in e.ranked(1):
+            if e.strange or e.worth(key) > e.worth(frozenset()):
+                e.reshape(key)
+    e.settle(1)
+    return e
