@@ -93,6 +93,14 @@ def test_a_filter_is_refused_from_half_the_sampling_rate_on():
             sawtooth(made.recordings["r"], made.geometry, Settings(cutoff=cutoff))
 
 
+def test_a_filter_is_refused_where_a_record_is_no_longer_than_what_it_is_padded_with():
+    """Two sections: 3 (2 2 + 1) samples to either side (scipy's `sosfiltfilt`), which needs one more."""
+    for n, words in ((15, "15 samples are too few"), (16, "no tooth")):
+        made = sample(record("r", TIME[:n], np.linspace(-0.002, 0.026, n), np.full(n, 0.1)))
+        with pytest.raises(InputError, match=words):
+            sawtooth(made.recordings["r"], made.geometry, Settings(cutoff=5.0))
+
+
 def test_resolution_by_hand():
     """tau_h = sqrt(9 pi E' G / (32 n h)): 2617 Pa for G 2, n 3, h 0.5 mm, mu 1564, K 20 kPa."""
     found = resolution(4000.0, 2.0, 1564.0, 2e4, 2e-3, 5e-4, 0.02, 0.005)

@@ -145,6 +145,8 @@ def test_a_fit_with_effects_starts_once_from_each_smaller_model():
     relax = {p for p in posed.free if ".viscoelasticity." in p}
     slack = {p for p in posed.free if ".slack." in p}
     assert [set(s) for s in neutral(posed)] == [relax | slack, slack, relax]
+    alone = problem(predictor(tj.material("neo-hookean", effects=["slack"]), sample, ("r1", "r2")))
+    assert [set(s) for s in neutral(alone)] == [slack]  # without it nothing is left to leave out: no second descent
     assert neutral(problem(predictor(tj.material("neo-hookean"), sample, ("r1", "r2")))) == []
 
 
