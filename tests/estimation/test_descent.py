@@ -11,7 +11,7 @@ from tissuejax.estimation.ending import Ending
 from tissuejax.estimation.methods import broyden, marquardt, trust_region
 from tissuejax.estimation.posed import LeastSquares, half_square
 from tissuejax.estimation.reach import Reach, bounded
-from tissuejax.estimation.rules import CREEP, Precise, Proposal
+from tissuejax.estimation.rules import CREEP, Damping, Precise, Proposal
 
 T = np.linspace(0, 3, 120)
 DATA = 2.0 * np.exp(-1.3 * T) + 0.01 * np.random.default_rng(3).normal(size=T.size)
@@ -139,6 +139,16 @@ def test_where_nothing_can_be_predicted_no_step_is_taken(method, how):
     found = descend(Cliff(how), np.log([4.0, 0.2]), method)
     assert found.converged
     assert np.exp(found.y[1]) == pytest.approx(1.3, abs=0.05)
+
+
+def test_damping_follows_what_a_step_kept_of_its_promise():
+    damping = Damping(1.0, 0.1, trusted=0.5, falls=4.0, least=0.05, doubted=3.0, rises=10.0, from_rise=0.5)
+    assert [damping.takes(drop, 2.0) for drop in (0.19, 0.21)] == [False, True]
+    assert damping.after(1.0, 1.1, 2.0) == 1.0 / 4  # more than half of it: held back less
+    assert damping.after(0.1, 1.1, 2.0) == 0.05  # but not below the least
+    assert damping.after(1.0, 0.9, 2.0) == 3.0  # less: held back more
+    assert damping.raised(1.0) == 10.0
+    assert damping.raised(0.01) == 0.5
 
 
 def test_endings_are_sentences():

@@ -42,6 +42,14 @@ def test_a_flat_direction_has_no_error_and_neither_have_its_members():
     assert of.sentences
 
 
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_two_columns_that_are_one_have_no_condition_whatever_their_size(rng, size):
+    """Their second singular value is rounding: some 1e-16 of the first, and not nothing."""
+    column = size * rng.normal(size=(80, 1))
+    of = uncertainty(column * [1.0, 3.0], np.ones(2), np.ones(2), NAMES[:2], UNITS[:2])
+    assert of.condition == np.inf
+
+
 @pytest.mark.parametrize(
     ("chi2", "n", "k", "estimated", "expected"),
     [
