@@ -19,9 +19,10 @@ from tissuejax.recordings.recording import Channel, Recording, Sample
 BEST = -50.0
 
 
-def weighed(key: tuple[str, ...], worth: float, **values: float) -> SimpleNamespace:
-    evidence = SimpleNamespace(keys=key, names=key, void=False, log_evidence=worth)
-    return SimpleNamespace(evidence=evidence, v=np.array([worth]), bench=None, refit=SimpleNamespace(values=values))
+def weighed(key: tuple[str, ...], worth: float, idle: tuple[str, ...] = (), **values: float) -> SimpleNamespace:
+    evidence = SimpleNamespace(keys=key, names=key, void=bool(idle), log_evidence=worth)
+    fit = SimpleNamespace(values=values)
+    return SimpleNamespace(evidence=evidence, v=np.array([worth]), bench=None, refit=fit, idle=idle)
 
 
 class Descents(Kept):
@@ -80,6 +81,32 @@ def test_elsewhere_one_descent_is_enough(astray, hum, costly):
     e.weighed[frozenset({"gap"})].evidence.log_evidence = -300.0
     e.weigh(("hum", "gap"), [{}])
     assert len(descents.starts) == 1
+
+
+class Idle(Kept):
+    """A gap does nothing wherever it is."""
+
+    def __init__(self, worth: float):
+        super().__init__()
+        self.worth, self.asked = worth, []
+
+    def weigh(self, scales, keys, start, criteria, course):
+        self.asked.append((tuple(keys), start))
+        return weighed(tuple(keys), self.worth, tuple(k for k in keys if k == "gap"), height=7.0)
+
+
+@pytest.mark.parametrize(("worth", "asked"), [(BEST + 5.0, 2), (BEST - 5.0, 1)])
+def test_a_set_with_an_effect_at_nothing_that_would_be_the_best_is_weighed_without_it(worth, asked):
+    idle = Idle(worth)
+    e = explored(idle)
+    e.weigh(("other", "hum", "gap"), [{}])
+    assert len(idle.asked) == asked
+    if asked == 2:
+        keys, start = idle.asked[1]
+        assert keys == ("other", "hum")
+        assert start.values == {"height": 7.0}  # from that fit
+        assert start.v == np.array([worth])
+        assert e.best == frozenset({"other", "hum"})
 
 
 def test_a_set_that_is_resumed_stays_where_it_was():

@@ -157,6 +157,11 @@ class Exploration:
         old = self.weighed.get(key)
         if old is None or found.evidence.log_evidence > old.evidence.log_evidence:
             self.weighed[key] = found
+        if found.evidence.log_evidence > self.weighed[self.best].evidence.log_evidence:
+            # an effect rests at nothing, so the set can't be given: without it it is the best one
+            for fewer in (key - {k} for k in found.idle):
+                if fewer and fewer not in self.weighed:
+                    self.weigh([k for k in order if k in fewer], [found.refit.values], found.bench, found.v)
         return self.weighed[key]
 
     def _descended(self, order: Sequence[str], begin: Sequence[Start], course: Course) -> Weighed:

@@ -51,6 +51,7 @@ class Weighed:
         bench: that it was weighed on; `settled`: whether its predictions are exact at the fit.
         linear: the problem about the fit; None of an impossible set.
         begun: values at which it began, by which the priors of its amplitudes go at first.
+        idle: keys of what does nothing there: it is the set without them.
     """
 
     evidence: SetEvidence
@@ -62,6 +63,7 @@ class Weighed:
     settled: bool = True
     linear: Linear | None = None
     begun: Mapping[str, float] = field(default_factory=dict)
+    idle: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -294,10 +296,11 @@ def _described(scales: Scales, keys: Sequence[str], best: Round, criteria: Crite
     base = max(float(before @ before) - n, 1e-9)
     whitened = Whitening(bench, scales.cut, scales.blocked, parts, v).residual(fit.prediction, bench.fitted)
     at_bound = tuple(p for p, b in zip(best.descent.paths, best.bound, strict=True) if b)
-    void = any(
-        _resting(bench.candidates[k], fit, bench, at_bound, v, scales.families)
-        or _idle(bench.candidates[k], fit, bench, scales.peak, best.felt)
+    idle = tuple(
+        k
         for k in keys
+        if _resting(bench.candidates[k], fit, bench, at_bound, v, scales.families)
+        or _idle(bench.candidates[k], fit, bench, scales.peak, best.felt)
     )
     precision = best.m.precision
     own = 0.5 * float(np.linalg.slogdet(precision)[1]) if len(precision) else 0.0
@@ -313,7 +316,7 @@ def _described(scales: Scales, keys: Sequence[str], best: Round, criteria: Crite
         amplitudes={p.name: math.sqrt(x) for p, x in zip(parts, v, strict=True)},
         k=len(fit.values),
         at_bound=at_bound,
-        void=void,
+        void=bool(idle),
         chi2=chi2,
         n=n,
         kurtosis=kurtosis(whitened),
@@ -324,7 +327,7 @@ def _described(scales: Scales, keys: Sequence[str], best: Round, criteria: Crite
         free=tuple(fit.values),
     )
     size = scales.peak if scales.size is None else scales.size
-    return Weighed(evidence, fit, v, parts, left * size, bench, linear=best.linear)
+    return Weighed(evidence, fit, v, parts, left * size, bench, linear=best.linear, idle=idle)
 
 
 def kurtosis(x: Float[np.ndarray, " n"]) -> float:
