@@ -113,7 +113,7 @@ def weighed(entry: panel_samples.Entry, path: str, at: Numbers, found: Found) ->
     sample, held = panel_samples.build(entry)
     asked = asked_of(sample, entry.energy, held, entry.ogden_form, criteria=at.criteria)
     cut, of = asked.left()
-    evidence = reweighed(asked.whole, cut, of, found, at.criteria)
+    evidence = reweighed(asked.searched(cut), cut, of, found, at.criteria)
     if path == USUAL:
         write_evidence(evidence, usual)
     return rejudge.verdict_of(judge(evidence, at.criteria), at.criteria)

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from tissuejax.diagnosis.material import SHORTEST, lengths
+from tissuejax.diagnosis.padding import SHORTEST, lengths
 
 
 @pytest.mark.parametrize("longest", [1, 100, 128, 129, 192, 193, 256, 700, 769, 5000])

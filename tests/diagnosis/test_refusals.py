@@ -1,6 +1,7 @@
 """What can't be diagnosed, or only in part, is said in a sentence that tells what to do."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -83,12 +84,16 @@ def test_parameters_at_which_the_faces_cannot_be_found_are_impossible():
     def stops(*_):
         raise ValueError("A linear solver received non-finite (NaN or inf) input")
 
-    bench._built = {key: replace(program, run=stops) for key, program in bench._built.items()}
+    bench._built = {
+        key: replace(program, run=SimpleNamespace(compiled=lambda *_: stops)) for key, program in bench._built.items()
+    }
     assert np.isnan(bench.predict({"energy.mu": 500.0})).all()
 
     def fails(*_):
         raise ValueError("another thing")
 
-    bench._built = {key: replace(program, run=fails) for key, program in bench._built.items()}
+    bench._built = {
+        key: replace(program, run=SimpleNamespace(compiled=lambda *_: fails)) for key, program in bench._built.items()
+    }
     with pytest.raises(ValueError, match="another thing"):
         bench.predict({})

@@ -123,10 +123,11 @@ class Kept:
         leaves, tree = jax.tree.flatten(arguments)
         return self._program(tree, leaves)(*leaves)
 
-    def prepare(self, *arguments: Any) -> None:
-        """Compile for arguments of these shapes; who calls meanwhile waits for it."""
+    def compiled(self, *arguments: Any) -> Callable:
+        """The program for arguments of these shapes, which takes their leaves: who calls it thousands of times need not
+        have it found each time. Who asks for it while it is compiled waits for that."""
         leaves, tree = jax.tree.flatten(arguments)
-        self._program(tree, leaves)
+        return self._program(tree, leaves)
 
     def _program(self, tree: Any, leaves: list) -> Callable:
         # asking NumPy for shape and type of what has them takes as long as a short program
@@ -182,7 +183,7 @@ def ahead(calls: Iterable[tuple[Kept, tuple]]) -> Iterator[None]:
     pool = ThreadPoolExecutor(cores, thread_name_prefix="ahead")
     try:
         for kept, arguments in calls:
-            pool.submit(kept.prepare, *arguments)
+            pool.submit(kept.compiled, *arguments)
         yield
     finally:
         pool.shutdown(wait=False, cancel_futures=True)

@@ -113,7 +113,7 @@ def diagnose(
         kept = Kept(keep, key(*told, question.criteria))
         if kept.before:
             noted(f"going on: {kept.before} sets were weighed before it was stopped")
-        found = answer(bench, asked.whole, cut, of, effort, noted, question.criteria, kept)
+        found = answer(bench, asked.searched(cut), cut, of, effort, noted, question.criteria, kept)
         made = asked.finished(found)
         made.unread = asked.predicted(whole, unread, found) if unread else {}
     if found.evidence.exhausted:

@@ -26,6 +26,7 @@ from tissuejax.cache.programs import Kept, ahead
 from tissuejax.diagnosis.bench import Bench, Candidate, Free
 from tissuejax.diagnosis.catalogue import Entry, entries, linked
 from tissuejax.diagnosis.judgement.blocks import State, strain
+from tissuejax.diagnosis.padding import lengthened, lengths
 from tissuejax.diagnosis.periodogram import lines
 from tissuejax.effects.form import Sizes
 from tissuejax.effects.material_test import MaterialTest
@@ -37,7 +38,6 @@ from tissuejax.model import Model
 from tissuejax.recordings.recording import Sample
 
 STRESS_CHANNEL = "nominal_stress"
-SHORTEST = 128  # samples that a series is lengthened to
 STEP = 1e-6  # of a parameter's scale
 STRESS = 0.05  # of the largest stress: the scale of a modulus or an offset
 
@@ -65,29 +65,6 @@ def compiled(model: Model) -> Kept:
         return nominal_stress(model, dict(zip(model.declared, theta)), test)
 
     return Kept(predicted, described(model))
-
-
-def lengthened(test: MaterialTest, n: int) -> MaterialTest:
-    """`test` with its last sample repeated up to `n` samples."""
-
-    def longer(series: np.ndarray) -> np.ndarray:
-        return np.concatenate([series, np.repeat(series[-1:], n - len(series), axis=0)])
-
-    arrays = {name: getattr(test, name) for name in test.__dataclass_fields__}
-    return MaterialTest(**{**arrays, "time": longer(test.time), "drive": longer(test.drive)})
-
-
-def lengths(samples: Sequence[int]) -> list[int]:
-    """To how many samples recordings of a sample are lengthened: few lengths, few compilations.
-
-    The longest to the next of 128, 192, 256, 384, 512, ..., the others to that or a half, a quarter, ... of it: a
-    program for another length takes as long to compile as it takes to run thousands of times, and a search runs it
-    some thousand times.
-    """
-    power = max(SHORTEST, 2 ** math.ceil(math.log2(max(samples))))
-    top = 3 * power // 4 if power > SHORTEST and max(samples) <= 3 * power // 4 else power
-    steps = [top >> k for k in range(top.bit_length()) if k == 0 or (top >> k) >= SHORTEST]
-    return [min(step for step in steps if step >= n) for n in samples]
 
 
 class MaterialBench(Bench):
@@ -133,8 +110,7 @@ class MaterialBench(Bench):
             candidates={},
             estimated=not any(sample.recordings[n].channels[STRESS_CHANNEL].noise_std for n in fitted),
         )
-        bench._tests = tests
-        bench._given = {n: jax.device_put(t) for n, t in tests.items()}  # once, and not at every prediction
+        bench._lay(tests)
         bench._of = {n: [s for s in segments if s.recording == n] for n in recordings}
         strain = max(float(np.max(np.abs(np.log(s.drive) if s.drive_name == "stretch" else s.drive))) for s in segments)
         top = bench._top = float(np.quantile(np.abs(bench.y), 0.98))
@@ -152,6 +128,12 @@ class MaterialBench(Bench):
         bench._declare(energy, found)
         bench._size_up()
         return bench
+
+    def _lay(self, tests: Mapping[str, MaterialTest]) -> None:
+        """Take these tests for what was done, by recording."""
+        self._tests = dict(tests)
+        self._given = {n: jax.device_put(t) for n, t in tests.items()}  # once, and not at every prediction
+        self._ready: dict[tuple[int, str], tuple[Callable, list]] = {}
 
     @property
     def starts(self) -> dict[str, float]:
@@ -239,12 +221,14 @@ class MaterialBench(Bench):
 
     def ahead(self) -> AbstractContextManager[None]:
         """See `Bench.ahead`: the programs of the base and of every candidate by itself, for each length of a series."""
-        programs = {}
-        for values in (self.base, *(c.paths for c in self.candidates.values())):
-            program = self._program(dict.fromkeys((*self.known, *values), 0.0))
-            programs[program] = None
+        wanted = (self.base, *(c.paths for c in self.candidates.values()))
+        programs = dict.fromkeys(self._program(dict.fromkeys((*self.known, *paths), 0.0)) for paths in wanted)
+        return ahead(call for program in programs for call in self._calls(program))
+
+    def _calls(self, program: Program) -> list[tuple[Kept, tuple]]:
+        """A program with arguments of every shape that these recordings have."""
         tests = {(t.mode, np.shape(t.drive)): n for n, t in self._tests.items() if n in self.fitted}
-        return ahead((p.run, (p.places[n][0], self._tests[n])) for p in programs for n in tests.values())
+        return [(program.run, (program.places[n][0], self._tests[n])) for n in tests.values()]
 
     def _places(self, model: Model, name: str) -> tuple[np.ndarray, tuple[dict[str, int], ...]]:
         """Neutral theta, and where values go in it: the recording's own, which count more, after the common ones."""
@@ -276,8 +260,16 @@ class MaterialBench(Bench):
         """Predictions of recordings; NaN where the faces of a specimen could not be found at such parameters. All are
         begun before the first is waited for: they run beside each other where there are cores."""
         self.spent += sum(program.price for program, _, _ in runs)
-        begun = [self._found(lambda p=p, t=t, n=n: p.run(t, self._given[n]), n) for p, t, n in runs]
+        begun = [self._found(lambda p=p, t=t, n=n: self._begun(p, t, n), n) for p, t, n in runs]
         return [self._found(lambda y=y: np.asarray(y), name) for y, (_, _, name) in zip(begun, runs, strict=True)]
+
+    def _begun(self, program: Program, theta: Float[np.ndarray, " p"], name: str) -> Array:
+        key = id(program), name
+        if key not in self._ready:
+            test = self._given[name]
+            self._ready[key] = program.run.compiled(theta, test), jax.tree.leaves(test)
+        run, leaves = self._ready[key]
+        return run(theta, *leaves)
 
     def _found(self, get: Callable[[], Array | np.ndarray], name: str) -> Array | np.ndarray:
         try:

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.foreseen import OPEN, foreseen
 from tissuejax.diagnosis.judgement.answer import Answered
 from tissuejax.diagnosis.judgement.blocks import Blocks, blocks, series
@@ -15,6 +16,7 @@ from tissuejax.diagnosis.material import MaterialBench, strain_states
 from tissuejax.diagnosis.next_experiment import proposals, settling
 from tissuejax.diagnosis.offered import offered, paced
 from tissuejax.diagnosis.result import Diagnosis
+from tissuejax.diagnosis.thinned import thinned
 from tissuejax.estimation.discrepancy import Discrepancy, discrepancy
 from tissuejax.estimation.sigma import sigmas
 from tissuejax.recordings.recording import Sample
@@ -45,6 +47,10 @@ class MaterialTests(Recorded):
         stacked = series(whole, cut, strain_states(whole), criteria.smooth, criteria.means, whole.starts)
         changing = paced(self.question.sample, criteria.shown)
         return cut, discrepancy(stacked, cut.spread(whole.sigma), changing, at_once=True, smooth=criteria.smooth)
+
+    def searched(self, cut: Blocks) -> Bench:
+        """See `Recorded.searched`."""
+        return thinned(self.whole, cut)
 
     def finished(self, found: Answered) -> Diagnosis:
         """See `Recorded.finished`; what the fitted recordings leave open in the others is said too."""

@@ -85,6 +85,10 @@ class Recorded(abc.ABC):
     def left(self) -> tuple[Blocks, Discrepancy]:
         """Block means of all that was measured, and the discrepancy that any model leaves of them."""
 
+    def searched(self, cut: Blocks) -> Bench:
+        """The bench that a search of these block means runs on."""
+        return self.whole
+
     @abc.abstractmethod
     def finished(self, found: Answered) -> Diagnosis:
         """The diagnosis, with what should be measured next."""
