@@ -335,47 +335,48 @@ def _filter(steps, y, seen, turns, share, tau, walk, diffuse, span):
 
 
 def _filter_twice(steps, y, seen, turns, share, tau, walk, diffuse, span):
-    """The same behind a low-pass of second order: states u, tau times its rate, a, b; covariances (4, 4, trials)."""
-    one, none = jnp.ones_like(share), jnp.zeros_like(share)
-
-    def whole(rows):
-        return jnp.stack([jnp.stack([none + x for x in row]) for row in rows])
+    """The same behind a low-pass of second order: states u, v (tau times its rate), a, b, and their covariances."""
+    white, none = 1 - share, jnp.zeros_like(share)
 
     def advance(carry, now):
-        mean, spread, logs, squares = carry
+        (u, v, a, b), (uu, uv, ua, ub, vv, va, vb, aa, ab, bb), logs, squares = carry
         dt, value, there, turn = now
-        kept = jnp.where(turn, jnp.array([1.0, 1.0, 1.0, 0.0]), 1.0)
-        mean, spread = mean * kept[:, None], spread * (kept[:, None] * kept[None, :])[:, :, None]
-        spread = spread.at[3, 3].set(jnp.where(turn, diffuse / span**2, spread[3, 3]))
-        seen_by = spread[:, 0] + spread[:, 2]
-        variance = seen_by[0] + seen_by[2] + 1 - share
-        error = jnp.where(there, value - mean[0] - mean[2], 0.0)
+        b, ub, vb, ab = (jnp.where(turn, 0.0, x) for x in (b, ub, vb, ab))
+        bb = jnp.where(turn, diffuse / span**2, bb)
+        hu, hv, ha, hb = uu + ua, uv + va, ua + aa, ub + ab
+        variance = hu + ha + white
+        error = jnp.where(there, value - u - a, 0.0)
         gain = jnp.where(there, 1 / variance, 0.0)
         logs = logs + jnp.where(there, jnp.log(variance), 0.0)
         squares = squares + gain * error**2
-        mean = mean + gain * seen_by * error
-        spread = spread - gain * seen_by[:, None] * seen_by[None, :]
+        ku, kv, ka, kb = gain * hu, gain * hv, gain * ha, gain * hb
+        u, v, a, b = u + ku * error, v + kv * error, a + ka * error, b + kb * error
+        uu, uv, ua, ub = uu - ku * hu, uv - ku * hv, ua - ku * ha, ub - ku * hb
+        vv, va, vb = vv - kv * hv, va - kv * ha, vb - kv * hb
+        aa, ab, bb = aa - ka * ha, ab - ka * hb, bb - kb * hb
         d = dt / tau
         e = jnp.exp(-d)
-        move = whole([[e * (1 + d), e * d, 0, 0], [-e * d, e * (1 - d), 0, 0], [0, 0, one, dt], [0, 0, 0, one]])
-        # 1 - move move' of the low-pass, written so that nothing cancels where d is small
+        p, q, r = e * (1 + d), e * d, e * (1 - d)  # u goes to p u + q v, v to r v - q u
+        # what is fresh in them, written so that nothing cancels where d is small
         w = -jnp.expm1(-2 * d)
-        uu, uv, vv = w - 2 * d * (1 + d) * e**2, 2 * d**2 * e**2, w + 2 * d * (1 - d) * e**2
-        fresh = whole([
-            [share * uu, share * uv, 0, 0],
-            [share * uv, share * vv, 0, 0],
-            [0, 0, walk * dt**3 / 3, walk * dt**2 / 2],
-            [0, 0, walk * dt**2 / 2, walk * dt],
-        ])  # fmt: skip
-        mean = jnp.sum(move * mean, 1)
-        half = jnp.sum(move[:, :, None] * spread, 1)  # by hand: products of so small matrices are quicker as sums
-        spread = jnp.sum(half[:, None] * move, 2) + fresh
-        return (mean, spread, logs, squares), None
+        fresh_uu, fresh_uv, fresh_vv = w - 2 * d * (1 + d) * e**2, 2 * q**2, w + 2 * d * (1 - d) * e**2
+        ua, va = ua + dt * ub, va + dt * vb
+        ua, va, ub, vb = p * ua + q * va, r * va - q * ua, p * ub + q * vb, r * vb - q * ub
+        uu, uv, vv = (
+            p * (p * uu + 2 * q * uv) + q**2 * vv + share * fresh_uu,
+            p * (r * uv - q * uu) + q * (r * vv - q * uv) + share * fresh_uv,
+            r * (r * vv - 2 * q * uv) + q**2 * uu + share * fresh_vv,
+        )
+        aa = aa + 2 * dt * ab + dt**2 * bb + walk * dt**3 / 3
+        ab = ab + dt * bb + walk * dt**2 / 2
+        bb = bb + walk * dt
+        spread = (uu, uv, ua, ub, vv, va, vb, aa, ab, bb)
+        return ((p * u + q * v, r * v - q * u, a + dt * b, b), spread, logs, squares), None
 
-    start = whole([
-        [share, 0, 0, 0], [0, share, 0, 0], [0, 0, none + diffuse, 0], [0, 0, 0, none + diffuse / span**2],
-    ])  # fmt: skip
-    return jax.lax.scan(advance, (jnp.zeros((4, len(share))), start, none, none), (steps, y, seen, turns))[0][2:]
+    level, slope = none + diffuse, none + diffuse / span**2
+    spread = (share, none, none, none, share, none, none, level, none, slope)
+    first = ((none, none, none, none), spread, none, none)
+    return jax.lax.scan(advance, first, (steps, y, seen, turns))[0][2:]
 
 
 _filtered = Kept(_filter, "estimation.correlation._filter")
