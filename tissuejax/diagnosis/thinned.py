@@ -36,7 +36,7 @@ class ThinnedBench(MaterialBench):
         Args:
             whole: with all samples; pieces: first sample of every piece, by recording.
         """
-        vars(self).update(vars(whole))
+        vars(self).update(vars(whole))  # sample, model and candidates are the same
         # asked for once a fit, so one length serves all recordings: one program more is to be compiled, not several
         self.whole = copy.copy(whole)
         longest = max(len(t.time) for t in whole._tests.values())
