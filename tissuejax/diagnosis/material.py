@@ -133,7 +133,7 @@ class MaterialBench(Bench):
         """Take these tests for what was done, by recording."""
         self._tests = dict(tests)
         self._given = {n: jax.device_put(t) for n, t in tests.items()}  # once, and not at every prediction
-        self._ready: dict[tuple[int, str], tuple[Callable, list]] = {}
+        self._ready: dict[tuple[Program, str], tuple[Callable, list]] = {}
 
     @property
     def starts(self) -> dict[str, float]:
@@ -264,7 +264,7 @@ class MaterialBench(Bench):
         return [self._found(lambda y=y: np.asarray(y), name) for y, (_, _, name) in zip(begun, runs, strict=True)]
 
     def _begun(self, program: Program, theta: Float[np.ndarray, " p"], name: str) -> Array:
-        key = id(program), name
+        key = program, name
         if key not in self._ready:
             test = self._given[name]
             self._ready[key] = program.run.compiled(theta, test), jax.tree.leaves(test)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,8 +17,7 @@ def lengthened(test: MaterialTest, n: int) -> MaterialTest:
     def longer(series: np.ndarray) -> np.ndarray:
         return np.concatenate([series, np.repeat(series[-1:], n - len(series), axis=0)])
 
-    arrays = {name: getattr(test, name) for name in test.__dataclass_fields__}
-    return MaterialTest(**{**arrays, "time": longer(test.time), "drive": longer(test.drive)})
+    return replace(test, time=longer(test.time), drive=longer(test.drive))
 
 
 def lengths(samples: Sequence[int]) -> list[int]:

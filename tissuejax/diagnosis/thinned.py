@@ -1,4 +1,4 @@
-"""A search's bench of material tests: two samples of every block in place of all, right where a fit comes to rest.
+"""A search's bench of material tests: pieces of every block in place of samples, right where a fit comes to rest.
 
 A search compares block means, so what happens within a block matters to it by its mean alone. Predicting every sample
 of slow recordings to take means of twenty is most of what a search would cost. Here a series is cut into pieces, about
