@@ -1,5 +1,6 @@
 """A second process gives what this one gives, and its errors come back."""
 
+import os
 import signal
 import threading
 import time
@@ -36,6 +37,16 @@ def test_a_failing_job_raises_here():
         workers.run_all([(_fails, 0, np.zeros(2))] * 3, 2)
 
 
+def test_what_is_stopped_in_the_middle_leaves_no_late_answer():
+    job = (_square, 3, np.ones(2))
+    workers.run_all([job] * 3, 2)  # a helper is there
+    at_work = workers._workers[0].process
+    with pytest.raises(KeyboardInterrupt):
+        workers.run_all([job] * 3, 2, _stopped_here)
+    assert at_work.wait(timeout=10) != 0
+    assert np.allclose(workers.run_all([job] * 3, 2), 3.0)
+
+
 def test_a_worker_leaves_ctrl_c_to_its_caller_and_ends_with_it_in_the_middle_of_a_job():
     worker = workers.Worker()
     assert worker.ask((_square, 3, np.ones(2)), programs.run).tolist() == [3.0, 3.0]
@@ -67,6 +78,14 @@ def test_inside_a_transformation_a_program_is_a_function():
 
 def _square(static, x):
     return static * x**2
+
+
+def _stopped_here(function, static, x):
+    if workers.CODE not in os.environ:  # here, and not in a helper
+        time.sleep(0.5)  # a helper has begun
+        raise KeyboardInterrupt
+    time.sleep(1.0)
+    return np.zeros(2)
 
 
 def _slow(job):

@@ -104,6 +104,9 @@ def release() -> None:
 def run_all(jobs: Sequence[Job], processes: int, do: Callable = programs.run) -> list:
     """Results of all jobs in order, on the host; this process takes them from the front, each worker from the back.
 
+    What ends it in the middle (Ctrl-C, an error here) ends the helpers that are at work: a late answer of one would be
+    taken for that of the next job.
+
     Args:
         jobs: (function, static, *arguments); the function has to be importable.
         processes: this one included.
@@ -120,33 +123,48 @@ def run_all(jobs: Sequence[Job], processes: int, do: Callable = programs.run) ->
                 return
             try:
                 results[i] = worker.ask(jobs[i], do)
-            except (EOFError, BrokenPipeError, pickle.PicklingError):  # a lost worker: its job is done here
+            except (EOFError, BrokenPipeError, pickle.PickleError):  # a lost worker: its job is done here
                 waiting.appendleft(i)
-                _workers.remove(worker)
+                _drop(worker)
                 return
             except Exception as error:
                 failures.append(error)
                 return
 
-    helpers = min(processes, len(jobs)) - 1
-    while len(_workers) < helpers:
+    count = min(processes, len(jobs)) - 1
+    while len(_workers) < count:
         _workers.append(Worker())
-    threads = [threading.Thread(target=serve, args=(w,), daemon=True) for w in _workers[:helpers]]
+    helpers = _workers[: max(count, 0)]
+    threads = [threading.Thread(target=serve, args=(w,), daemon=True) for w in helpers]
     for thread in threads:
         thread.start()
-    while True:
-        while waiting:
-            try:
-                i = waiting.popleft()
-            except IndexError:
-                break
-            results[i] = jax.device_get(do(*jobs[i]))
-        for thread in threads:
-            thread.join()
-        if failures:
-            raise failures[0]
-        if not waiting:
-            return results
+    try:
+        while True:
+            while waiting:
+                try:
+                    i = waiting.popleft()
+                except IndexError:
+                    break
+                results[i] = jax.device_get(do(*jobs[i]))
+            for thread in threads:
+                thread.join()
+            if failures:
+                raise failures[0]
+            if not waiting:
+                return results
+    except BaseException:
+        waiting.clear()
+        for worker, thread in zip(helpers, threads, strict=True):
+            if thread.is_alive():
+                _drop(worker)
+        raise
+
+
+def _drop(worker: Worker) -> None:
+    """End a helper that will not answer any more."""
+    with suppress(ValueError):
+        _workers.remove(worker)
+    worker.process.kill()
 
 
 def serve_pipe() -> None:
