@@ -1,5 +1,6 @@
 """A set holds every set inside it: where its descent ends far below one of them it is followed from there too."""
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -154,3 +155,30 @@ def test_starts_that_come_near_the_best_one_are_followed_each_place_once(costly,
     e = explored(places, costly=costly)
     found = e.weigh(("slack",), [{p: 1.0} for p in "dbac"])
     assert (places.followed, found.evidence.log_evidence) == (followed, best)
+
+
+class Broken(Kept):
+    """A fine simulation that breaks down at a stiffness of 3, and nowhere else."""
+
+    def __init__(self):
+        super().__init__()
+        self.asked = []
+
+    def weigh(self, scales, keys, start, criteria, course):
+        self.asked.append(dict(start.values))
+        found = weighed(tuple(keys), -math.inf if start.values["mu"] == 3.0 else BEST - 1.0)
+        found.settled = True
+        return found
+
+
+def test_where_the_fine_simulation_breaks_down_a_set_is_settled_from_the_base():
+    e = explored(Broken())
+    e.scales = SimpleNamespace(bench=e.bench, values={"mu": 1.0})
+    e.bench.base = ("mu",)
+    for w in e.weighed.values():
+        w.settled = True
+    hum = frozenset({"hum"})
+    e.weighed[hum].settled = False
+    e.settle(1)
+    assert e.kept.asked == [{"mu": 3.0, "height": 2.0}, {"mu": 1.0, "height": 2.0}]
+    assert e.weighed[hum].evidence.log_evidence == BEST - 1.0

@@ -12,7 +12,7 @@ from weighed_sets import evidence, weighed
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.evidence import read_evidence, write_evidence
 from tissuejax.diagnosis.judgement.judge import Beforehand, Kind, judge
-from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, amplitudes, marginal
+from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, amplitudes, factored, marginal
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
 from tissuejax.estimation.discrepancy import Part, Series, discrepancy, loading_states
 from tissuejax.estimation.smoothness import USUAL
@@ -274,6 +274,31 @@ def test_the_mass_over_one_amplitude_is_its_integral(name, width, chance):
     exact = math.log(np.trapezoid(np.exp(logs - m.value) * density, a))
     tolerance = 0.03 if part[0].factor is not None else 0.25
     assert amplitude_mass(linear, part, priors, blocked, v, m) == pytest.approx(exact, abs=tolerance)
+
+
+def test_the_mass_of_an_amplitude_far_from_nothing_is_its_integral():
+    """What changes slowly is thirty times its prior's width, so that an amplitude near nothing is out of question."""
+    linear, parts, blocked = made(n=40)
+    (part,) = (p for p in parts if p.name == "slow")
+    wave = np.linalg.cholesky(dense(part)[:40, :40] + 1e-6 * np.eye(40)) @ np.random.default_rng(5).standard_normal(40)
+    linear = dataclasses.replace(linear, residual=linear.residual + 0.5 * np.concatenate([wave, -wave]))
+    priors = Widths(np.array([0.02]), np.array([0.1]))
+    v, m = amplitudes(linear, [part], priors, blocked, np.array([0.25]))
+    nothing = marginal(linear, [part], np.zeros(1), blocked).value
+    assert nothing - m.value < -100  # nats
+    a = np.linspace(0.02, 2.0, 1500)
+    logs = np.array([marginal(linear, [part], np.array([x**2]), blocked).value for x in a])
+    density = 0.9 * halfnorm(scale=0.02).pdf(a) + 0.1 * halfnorm(scale=0.2).pdf(a)
+    exact = math.log(np.trapezoid(np.exp(logs - m.value) * density, a))
+    assert amplitude_mass(linear, [part], priors, blocked, v, m) == pytest.approx(exact, abs=0.05)
+
+
+@pytest.mark.parametrize(("matrix", "error"), [([[1.0, 0.5], [0.5, 1.0]], 1e-11), ([[1.0, 1.0], [1.0, 1.0]], 1e-9)])
+def test_a_matrix_of_correlations_is_factored_as_it_is_also_where_it_is_singular(matrix, error):
+    found, lower = factored(np.array(matrix))
+    root = np.tril(found)
+    assert lower
+    np.testing.assert_allclose(root @ root.T, matrix, rtol=0, atol=error)
 
 
 def test_the_evidence_along_a_smooth_part_is_exact():

@@ -1,6 +1,7 @@
 """Which sets a search grows: a law that is anything smooth, and one of a few terms beside it."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -53,3 +54,24 @@ def test_pairs_are_told_apart_too_and_void_sets_are_not_grown():
     e = explored({**SINGLES, **pairs}, wide=False)
     assert e.ranked(2) == [{WIDE, HUM}]
     assert e.parents(2) == [{WIDE, HUM}, {TERMS, HUM}]
+
+
+def test_a_family_with_a_name_may_be_wide_without_it_only_beside_another_form_of_that_name():
+    e = explored(SINGLES, wide=False)
+    scales, c = replace(e.scales, families=("law", "slow")), Criteria()
+    assert scales.priors(c).chance.tolist() == [0.0, c.unknown]
+    assert scales.priors(c, (TERMS,)).chance.tolist() == [c.partly, c.unknown]
+    widened = scales.priors(c, (WIDE,))
+    assert widened.chance.tolist() == [0.0, c.unknown]
+    assert widened.width.tolist() == [0.1, c.shares["slow"]]
+
+
+def test_how_large_an_effect_may_be_goes_by_the_stress_that_it_acts_on():
+    """Two blocks at 100 Pa that it leaves alone, two at 2 Pa of which each changes by 1 Pa per unit."""
+    moved = np.array([[0.0], [0.0], [1.0], [1.0]])
+    bench = SimpleNamespace(columns=lambda values, wanted: moved, free={"offset": SimpleNamespace(scale=7.0)})
+    cut = SimpleNamespace(mean=lambda x: x)
+    scales = Scales(bench, None, (), cut, None, {}, np.array([100.0, 100.0, 2.0, 2.0]), 100.0)
+    one = SimpleNamespace(amplitudes=("offset",), shapes=(), grid=({},), rig=False)
+    size = scales.effect_size(one, {}, Criteria())["offset"]
+    assert size == pytest.approx(Criteria().usual(False) * math.sqrt((2.0**2 + 2.0**2) / (1.0**2 + 1.0**2)))
