@@ -19,6 +19,7 @@ from tissuejax.diagnosis.bench import Bench, Candidate, Free
 from tissuejax.diagnosis.judgement import answer as judged
 from tissuejax.diagnosis.judgement.blocks import State, blocks, series, strain
 from tissuejax.diagnosis.judgement.effort import Effort
+from tissuejax.diagnosis.judgement.search import Setup
 from tissuejax.errors import InputError
 from tissuejax.estimation.discrepancy import discrepancy
 from tissuejax.estimation.series import Segment
@@ -208,7 +209,7 @@ def answer(data: dict[str, np.ndarray]) -> tuple[dict, Sites, tuple[np.ndarray, 
     cut = blocks(whole)
     states = [State("press", strain(s)[:, None]) for s in whole.segments]
     of = discrepancy(series(whole, cut, states), cut.spread(whole.sigma))
-    v = judged.answer(bench, whole, cut, of, EFFORT)
+    v = judged.answer(bench, whole, cut, of, Setup(effort=EFFORT))
     mask = {n: bench.mask((n,)) for n in ("fitted sites", "held-out sites")}
 
     def rmse(r):

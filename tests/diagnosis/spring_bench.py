@@ -8,6 +8,7 @@ from tissuejax.diagnosis.bench import Bench, Candidate, Free
 from tissuejax.diagnosis.judgement.answer import Answered, answer
 from tissuejax.diagnosis.judgement.blocks import blocks, driven_states, series
 from tissuejax.diagnosis.judgement.effort import Effort
+from tissuejax.diagnosis.judgement.search import Setup
 from tissuejax.estimation.discrepancy import discrepancy
 from tissuejax.estimation.series import Segment
 
@@ -109,4 +110,4 @@ def judged(bench: Bench, effort: Effort | None = None) -> Answered:
     whole.fitted, whole.held_out = (*bench.fitted, *bench.held_out), ()
     cut = blocks(whole)
     of = discrepancy(series(whole, cut, driven_states(whole)), cut.spread(whole.sigma))
-    return answer(bench, whole, cut, of, effort)
+    return answer(bench, whole, cut, of, Setup(effort=effort or Effort()))

@@ -6,7 +6,7 @@ from tissuejax.diagnosis.diagnose import asked_of
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.judgement.kept import Kept
-from tissuejax.diagnosis.judgement.search import alone, based
+from tissuejax.diagnosis.judgement.search import Setup, alone, based
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 MU, LOST, ENERGY, NOISE = 1000.0, 0.45, 60.0, 15.0  # Pa, 1, J/m3, Pa
@@ -39,7 +39,7 @@ def test_damage_on_the_virgin_path_is_tried_though_damage_behind_it_says_nothing
     cut, of = asked.left()
     criteria, effort = Criteria(), Effort()
     scales, base = based(asked.whole, cut, of, criteria, effort, Kept())
-    found = alone(scales.bench, scales, base, criteria, effort)
+    found = alone(scales.bench, scales, base, Setup(criteria, effort))
     assert found.best == {"softening/with loading"}
     relaxing = [k for k in found.weighed if found.names(k) == {"viscoelasticity"}]
     assert found.worth(found.best) > max(map(found.worth, relaxing)) + 3

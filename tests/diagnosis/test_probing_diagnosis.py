@@ -5,6 +5,7 @@ import pytest
 
 from tests.probing.bench import VALUES, measured, recording, sample
 from tissuejax.diagnosis.judgement.answer import Answered, answer
+from tissuejax.diagnosis.judgement.search import Setup
 from tissuejax.diagnosis.kinds.probings import PROBING
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_discrepancy import probing_discrepancy
@@ -29,7 +30,7 @@ def diagnosed(**more: float) -> Answered:
     )
     whole, shown = ProbingView.of(own), ProbingView.of(own.narrowed(("a",), ("b",), NAMES))
     cut = probing_blocks(whole)
-    found = answer(shown, whole, cut, probing_discrepancy(whole, cut), PROBING)
+    found = answer(shown, whole, cut, probing_discrepancy(whole, cut), Setup(effort=PROBING))
     found.simulations = own.runs.count
     return found
 

@@ -6,6 +6,7 @@ import pytest
 from tests.probing.bench import VALUES, measured, recording, sample
 from tissuejax.challenge.rests.play import play
 from tissuejax.diagnosis.judgement.answer import Answered, answer
+from tissuejax.diagnosis.judgement.search import Setup
 from tissuejax.diagnosis.kinds.probings import PROBING
 from tissuejax.diagnosis.probing import ProbingBench
 from tissuejax.diagnosis.probing_discrepancy import probing_discrepancy
@@ -65,7 +66,7 @@ def diagnosed(simulated, fault, tried) -> Answered:
         assert not left_out
     view = ProbingView.of(own)
     cut = probing_blocks(view)
-    found = answer(ProbingView.of(shown), view, cut, probing_discrepancy(view, cut), PROBING)
+    found = answer(ProbingView.of(shown), view, cut, probing_discrepancy(view, cut), Setup(effort=PROBING))
     found.simulations = own.runs.count
     return found
 

@@ -14,6 +14,7 @@ from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.judgement.judge import judge
 from tissuejax.diagnosis.judgement.numbers import Numbers
 from tissuejax.diagnosis.judgement.reweigh import Found, Rested, reweighed
+from tissuejax.diagnosis.judgement.search import Setup
 from tissuejax.errors import InputError
 from tissuejax.estimation.discrepancy import discrepancy
 
@@ -26,7 +27,7 @@ def searched():
     whole.fitted, whole.held_out = (*bench.fitted, *bench.held_out), ()
     cut = blocks(whole)
     of = discrepancy(series(whole, cut, driven_states(whole)), cut.spread(whole.sigma))
-    return whole, cut, of, answer(bench, whole, cut, of, Effort(most=1, singles=4, reshaped=(0, 0, 0)))
+    return whole, cut, of, answer(bench, whole, cut, of, Setup(effort=Effort(most=1, singles=4, reshaped=(0, 0, 0))))
 
 
 def by_keys(evidence):

@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 from tissuejax.diagnosis.judgement.answer import answer
 from tissuejax.diagnosis.judgement.blocks import blocks, series
 from tissuejax.diagnosis.judgement.effort import Effort
+from tissuejax.diagnosis.judgement.search import Setup
 from tissuejax.diagnosis.material import MaterialBench, strain_states
 from tissuejax.energies.catalogue import energy
 from tissuejax.estimation.discrepancy import discrepancy
@@ -74,7 +75,7 @@ def test_two_unlike_families_are_found_from_off_the_axis(bench):
     whole.fitted, whole.held_out = (*bench.fitted, *bench.held_out), ()
     cut = blocks(whole)
     of = discrepancy(series(whole, cut, strain_states(whole)), cut.spread(whole.sigma))
-    verdict = answer(bench, whole, cut, of, Effort(most=1))
+    verdict = answer(bench, whole, cut, of, Setup(effort=Effort(most=1)))
     assert verdict.judgement.names == ("anisotropy",)
     values = verdict.chosen.values
     angle, spread = (values[f"effects.anisotropy.{name}"] for name in ("angle", "spread"))

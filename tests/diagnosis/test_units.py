@@ -10,7 +10,7 @@ from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.judgement.evidence import SetEvidence
 from tissuejax.diagnosis.judgement.kept import Kept
-from tissuejax.diagnosis.judgement.search import alone, based
+from tissuejax.diagnosis.judgement.search import Setup, alone, based
 from tissuejax.recordings.recording import Channel, Recording, Sample
 
 MU, SHARES, TIMES, NOISE = 1000.0, (0.3, 0.25), (0.6, 9.0), 0.004  # Pa, 1, s, of the largest stress
@@ -57,7 +57,7 @@ def weighed(stiffer: float) -> dict[frozenset[str], SetEvidence]:
     cut, of = asked.left()
     criteria, effort = Criteria(), Effort(most=1, given_up=math.inf)
     scales, base = based(asked.whole, cut, of, criteria, effort, Kept())
-    found = alone(scales.bench, scales, base, criteria, effort)
+    found = alone(scales.bench, scales, base, Setup(criteria, effort))
     found.reshape(frozenset({"softening"}))
     return {key: w.evidence for key, w in found.weighed.items()}
 

@@ -33,7 +33,7 @@ ROUNDING = {
     "estimation/sudden.py": {"stiffness 3": "degree of a curve through a series, for its slope"},
     "estimation/discrepancy.py": {"LEFT_OUT 1e-05": "eigenvalues that are cut off"},
     "judgement/blocks.py": {"blocks 3": "time, strain and stress, each a third of a block's way"},
-    "judgement/explore.py": {"score 3": "the first three of a tuple"},
+    "judgement/nominate.py": {"nominated 3": "the first three of a tuple"},
     "judgement/judge.py": {"judge 10": "alternatives that are listed; the posterior has them all"},
     "judgement/marginal.py": {
         "factor 10": "default of `Widths.factor`, where no part is wider",

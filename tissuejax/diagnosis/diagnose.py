@@ -19,6 +19,7 @@ from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.judgement.evidence import write_evidence
 from tissuejax.diagnosis.judgement.kept import Kept
+from tissuejax.diagnosis.judgement.search import Setup
 from tissuejax.diagnosis.kinds.recorded import Question, Recorded
 from tissuejax.diagnosis.known import known_physics, label
 from tissuejax.diagnosis.result import Diagnosis
@@ -113,7 +114,8 @@ def diagnose(
         kept = Kept(keep, key(*told, question.criteria))
         if kept.before:
             noted(f"going on: {kept.before} sets were weighed before it was stopped")
-        found = answer(bench, asked.searched(cut), cut, of, effort, noted, question.criteria, kept)
+        by = Setup(question.criteria, effort or Effort(), noted, kept)
+        found = answer(bench, asked.searched(cut), cut, of, by)
         made = asked.finished(found)
         made.unread = asked.predicted(whole, unread, found) if unread else {}
     if found.evidence.exhausted:

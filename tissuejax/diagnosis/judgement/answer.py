@@ -16,14 +16,11 @@ from jaxtyping import Float
 from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.judgement.carried import carried
-from tissuejax.diagnosis.judgement.criteria import Criteria
-from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.explore import Exploration
 from tissuejax.diagnosis.judgement.judge import Judgement, Kind, judge, undecided
-from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.rest import level
-from tissuejax.diagnosis.judgement.search import explore
+from tissuejax.diagnosis.judgement.search import Setup, explore
 from tissuejax.diagnosis.judgement.twins import merged
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.misfit import Misfit, white
@@ -175,22 +172,20 @@ def answer(
     whole: Bench,
     cut: Blocks,
     of: Discrepancy,
-    effort: Effort | None = None,
-    report: Callable[[str], None] | None = None,
-    criteria: Criteria | None = None,
-    kept: Kept | None = None,
+    by: Setup | None = None,
 ) -> Answered:
     """Weigh sets on all recordings, judge, and fit what is shown to the fitted recordings alone.
 
     Args:
         bench: with recordings held out; `whole`: the same sample with all of them fitted.
         cut, of: block means of both, and the discrepancy that any model leaves of them.
-        kept: where sets are kept for a diagnosis that is begun again.
+        by: what the search is done with.
     """
+    by = by or Setup()
     with whole.ahead():
-        found = explore(whole, cut, of, criteria, effort, report, kept)
+        found = explore(whole, cut, of, by)
     evidence = found.evidence(bench.fitted, bench.held_out)
-    judgement = judge(evidence, criteria)
+    judgement = judge(evidence, by.criteria)
     shown = copy.copy(bench)
     shown.candidates = {k: replace(c, held=()) for k, c in bench.candidates.items()}
     out = Answered(shown, found, evidence, judgement)

@@ -1,9 +1,8 @@
 """Which sets of effects are weighed: nominated by the evidence of one linear step, grown, reshaped, and pruned.
 
-At the fit of a set every candidate's linear step is scored under the noise and the discrepancy of that fit, and again
-under a discrepancy of its prior's size (a set that has no name yet may have given its misfit to the discrepancy). The
-best are weighed in full (`weigh`). Sets of two grow from the best single ones, sets of three from the best pairs, the
-best sets are tried in all their forms and with every effect left out.
+At the fit of a set every candidate's linear step is scored (`nominate`). The best are weighed in full (`weigh`). Sets
+of two grow from the best single ones, sets of three from the best pairs, the best sets are tried in all their forms and
+with every effect left out.
 """
 
 import itertools
@@ -21,11 +20,11 @@ from tissuejax.diagnosis.judgement.effort import Course, Effort
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.judge import Beforehand
 from tissuejax.diagnosis.judgement.kept import Kept
-from tissuejax.diagnosis.judgement.scales import Scales, squared
+from tissuejax.diagnosis.judgement.nominate import nominated
+from tissuejax.diagnosis.judgement.scales import Scales
 from tissuejax.diagnosis.judgement.sudden import beside, happened, held, joined
 from tissuejax.diagnosis.judgement.weigh import Start, Weighed
-from tissuejax.diagnosis.judgement.whitening import Whitening
-from tissuejax.diagnosis.score import Score, complement, gain, trusted
+from tissuejax.diagnosis.score import Score
 from tissuejax.diagnosis.starts import distinct, inside
 
 
@@ -201,69 +200,19 @@ class Exploration:
 
     def score(self, key: frozenset) -> list[Score]:
         """Every candidate that may join the set, by the log evidence that its linear step gains, best first."""
-        if key in self.scored:
-            return self.scored[key]
-        self.tell("trying every effect beside", sorted(self.names(key)))
-        at, names = self.weighed[key], self.names(key)
-        left = [
-            c
-            for c in self.bench.candidates.values()
-            if c.name not in names
-            and c.nominated
-            and c.amplitudes
-            and self.bench.nested((*key, c.key)) <= self.effort.nested
-        ]
-        values, bench, scales = at.refit.values, self.bench, self.scales
-        prediction = at.refit.prediction
-        grids = [list(bench.settings(c, prediction)) for c in left]
-        wanted = [(s, a) for c, grid in zip(left, grids, strict=True) for s in grid for a in c.amplitudes]
-        if not wanted:
-            return []
-        columns = bench.columns(values, wanted)
-        jac = bench.jacobian(values, tuple(values), bench.fitted)
-        usual = scales.priors(self.criteria).width ** 2
-        found: dict[str, Score] = {}
-        for v in (at.v, usual):
-            whitening = Whitening(bench, scales.cut, scales.blocked, at.parts, v)
-            basis = complement(whitening.whiten(jac, bench.fitted))
-            r = whitening.residual(prediction, bench.fitted)
-            r = r - basis @ (basis.T @ r)
-            with np.errstate(over="ignore", invalid="ignore"):  # a column may be beyond all numbers: no trial of it
-                white = whitening.whiten(columns, bench.fitted)
-                white = white - basis @ (basis.T @ white)
-            column = 0
-            for c, grid in zip(left, grids, strict=True):
-                trials, k = [], len(c.amplitudes)
-                for s in grid:
-                    block, raw = white[:, column : column + k], columns[:, column : column + k]
-                    column += k
-                    if np.isfinite(squared(block)) and np.isfinite(squared(raw)):
-                        trials.append(self._trial(c, s, values, r, block, raw))
-                trials = sorted(trials, key=lambda t: -t[0])
-                if trials and (c.key not in found or trials[0][0] > found[c.key].gain):
-                    g, step, setting, moved = trials[0]
-                    size = float(np.linalg.norm(moved)) or 1.0
-                    all_of_them = tuple(t[:3] for t in trials)
-                    share = float(min(max(2 * g / max(r @ r, 1e-9), 0.0), 1.0))
-                    found[c.key] = Score(c.key, g, share, step, setting, moved / size, all_of_them)
-        self.scored[key] = sorted(found.values(), key=lambda s: -s.gain)
+        if key not in self.scored:
+            self.tell("trying every effect beside", sorted(self.names(key)))
+            names = self.names(key)
+            left = [
+                c
+                for c in self.bench.candidates.values()
+                if c.name not in names
+                and c.nominated
+                and c.amplitudes
+                and self.bench.nested((*key, c.key)) <= self.effort.nested
+            ]
+            self.scored[key] = nominated(self.bench, self.scales, self.weighed[key], left, self.criteria, self.before)
         return self.scored[key]
-
-    def _trial(self, c, setting, values, r, block, raw) -> tuple[float, dict, dict, np.ndarray]:
-        """Log evidence of the linear step: what it removes, less what its amplitudes could have done."""
-        bench = self.bench
-        origin = np.array([{**bench.start, **values, **setting}[a] for a in c.amplitudes])
-        low = np.array([trusted(bench.free[a])[0] for a in c.amplitudes]) - origin
-        high = np.array([trusted(bench.free[a])[1] for a in c.amplitudes]) - origin
-        g, step = gain(r, block, np.minimum(low, 0.0), np.maximum(high, 0.0))
-        moved = np.sum(self.scales.cut.mean(raw) ** 2, axis=0)
-        stress = float(np.sum(self.scales.reference**2))
-        usual = self.criteria.usual(c.rig)
-        size = np.where(moved > 0, usual * np.sqrt(stress / np.where(moved > 0, moved, 1.0)), 0.0)
-        h = (block * size).T @ (block * size)
-        price = 0.5 * float(np.linalg.slogdet(np.eye(len(h)) + h)[1])
-        worth = 0.5 * g - price + math.log(self.before.odds[c.name] / self.before.forms[c.name])
-        return worth, dict(zip(c.amplitudes, step.tolist(), strict=True)), dict(setting), block @ step
 
     def extend(self, parents: Sequence[frozenset], most: int, each: int) -> None:
         """Weigh sets with one effect more: the best nominees of every parent in turn."""

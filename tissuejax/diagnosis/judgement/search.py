@@ -11,7 +11,7 @@ anew, for sets are compared under one noise.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -30,39 +30,42 @@ from tissuejax.errors import NotConverged
 from tissuejax.estimation.correlation import GAIN
 from tissuejax.estimation.discrepancy import Discrepancy
 
-Report = Callable[[str], None] | None
+
+@dataclass(frozen=True)
+class Setup:
+    """What a search is done with.
+
+    Attributes:
+        criteria: the numbers that make a verdict; effort: how much is tried.
+        report: told what is done now.
+        kept: where sets are kept for a search that is begun again; nowhere by default.
+    """
+
+    criteria: Criteria = field(default_factory=Criteria)
+    effort: Effort = field(default_factory=Effort)
+    report: Callable[[str], None] = lambda _: None
+    kept: Kept = field(default_factory=Kept)
 
 
-def explore(
-    bench: Bench,
-    cut: Blocks,
-    of: Discrepancy,
-    criteria: Criteria | None = None,
-    effort: Effort | None = None,
-    report: Report = None,
-    kept: Kept | None = None,
-) -> Exploration:
+def explore(bench: Bench, cut: Blocks, of: Discrepancy, by: Setup) -> Exploration:
     """Weigh the base model and the sets that are worth it; see the module's text.
 
     Args:
         bench: with all recordings fitted.
         cut: block means of what was measured; of: the discrepancy that any model leaves of them.
-        kept: where sets are kept for a search that is begun again; nowhere by default.
 
     Raises:
         NotConverged: the base model can't be fitted at all.
     """
-    criteria, effort, kept = criteria or Criteria(), effort or Effort(), kept or Kept()
-    if report:
-        report("fitting the base model")
-    scales, base = based(bench, cut, of, criteria, effort, kept)
-    e = searched(scales.bench, scales, base, criteria, effort, report, kept)
-    for _ in range(effort.readings):
+    by.report("fitting the base model")
+    scales, base = based(bench, cut, of, by.criteria, by.effort, by.kept)
+    e = searched(scales.bench, scales, base, by)
+    for _ in range(by.effort.readings):
         if (noise := noise_beside(e)) is None:
             break
         best, scales = e.weighed[e.best], replace(scales, blocked=noise)
-        base = kept.weigh(scales, (), Start(base.refit.values), criteria, effort.course)
-        e = searched(scales.bench, scales, base, criteria, effort, report, kept)
+        base = by.kept.weigh(scales, (), Start(base.refit.values), by.criteria, by.effort.course)
+        e = searched(scales.bench, scales, base, by)
         e.noise_of = best
     e.look_again()
     return e
@@ -83,20 +86,13 @@ def noise_beside(e: Exploration) -> Blocked | None:
     return noise if again.evidence.log_evidence - best.evidence.log_evidence > GAIN / 2 else None
 
 
-def searched(
-    bench: Bench,
-    scales: Scales,
-    base: Weighed,
-    criteria: Criteria,
-    effort: Effort,
-    report: Report,
-    kept: Kept,
-) -> Exploration:
+def searched(bench: Bench, scales: Scales, base: Weighed, by: Setup) -> Exploration:
     """The sets that are worth it, weighed under the noise of these scales."""
-    e = alone(bench, scales, base, criteria, effort, report, kept)
-    scales, disturbed = disrupted(scales, base, criteria, effort.course)
+    effort = by.effort
+    e = alone(bench, scales, base, by)
+    scales, disturbed = disrupted(scales, base, by.criteria, effort.course)
     if e.log_worth(disturbed) > e.worth(e.best):  # better than any single effect: all of them beside what happened
-        e = alone(bench, scales, disturbed, criteria, effort, report, kept)
+        e = alone(bench, scales, disturbed, by)
     if bench.costly:  # one start was all that the base had
         e.leave_out(e.best)
     for size, most in ((1, effort.pairs), (2, effort.triples)):
@@ -150,20 +146,11 @@ def rooted(scales: Scales, base: Weighed, free: Mapping[str, Free]) -> None:
     scales.bench.free = dict(free)  # without the priors of a set
 
 
-def alone(
-    bench: Bench,
-    scales: Scales,
-    base: Weighed,
-    criteria: Criteria,
-    effort: Effort,
-    report: Report = None,
-    kept: Kept | None = None,
-) -> Exploration:
+def alone(bench: Bench, scales: Scales, base: Weighed, by: Setup) -> Exploration:
     """An exploration with the base and all single effects weighed."""
     rooted(scales, base, bench.free)
-    e = Exploration(
-        scales.bench, criteria, effort, scales, report or (lambda _: None), {frozenset(): base}, kept=kept or Kept()
-    )
+    sets, effort = {frozenset(): base}, by.effort
+    e = Exploration(scales.bench, by.criteria, effort, scales, by.report, sets, kept=by.kept)
     e.extend([frozenset()], effort.singles, effort.singles)
     for key in e.near(1)[: effort.reshaped[0]]:
         e.reshape(key)
