@@ -1,5 +1,6 @@
 """What is read from a cutting record without a simulation: teeth, resolution, refusals."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -83,6 +84,20 @@ def test_a_mesh_is_named_as_far_as_its_period_goes():
     assert not told(1.0, scatter=0.26)
     assert told(1.0, n=4)
     assert not told(1.0, n=3)
+
+
+@pytest.mark.parametrize("hertz", [5.0, 10.0, 20.0])
+def test_a_record_is_filtered_there_and_back_at_the_cutoff_asked_for(hertz):
+    """Butterworth of order 4 in bilinear form, twice: 1 / (1 + (tan(pi f / f_s) / tan(pi f_c / f_s))^8) of a ripple."""
+    force, ripple = toothed(), 0.01 * np.sin(2 * math.pi * hertz * TIME)
+    smooth, rippled = (
+        sawtooth(made.recordings["r"], made.geometry, Settings(cutoff=10.0)).force[:, 0]
+        for made in (sample(record("r", TIME, X, f)) for f in (force, force + ripple))
+    )
+    rate = 1 / (TIME[1] - TIME[0])
+    share = 1 / (1 + (math.tan(math.pi * hertz / rate) / math.tan(math.pi * 10.0 / rate)) ** 8)
+    middle = slice(len(TIME) // 4, -len(TIME) // 4)
+    np.testing.assert_allclose((rippled - smooth)[middle], share * ripple[middle], atol=1e-5)
 
 
 def test_a_filter_is_refused_from_half_the_sampling_rate_on():
