@@ -42,7 +42,7 @@ NEWEST = {
         "material-twentieth",
         "material-twenty-first",
     ),
-    "beside a rest": ("rest-seventh", "rest-eighth", "rest-ninth"),
+    "beside a rest": ("rest-seventh", "rest-eighth", "rest-ninth", "rest-tenth"),
     "probings": ("probing-seventh",),
     "probings beside a rest": ("probing-rest",),
 }  # the newest of each kind, of the judgements of their day
