@@ -182,3 +182,19 @@ def test_where_the_fine_simulation_breaks_down_a_set_is_settled_from_the_base():
     e.settle(1)
     assert e.kept.asked == [{"mu": 3.0, "height": 2.0}, {"mu": 1.0, "height": 2.0}]
     assert e.weighed[hum].evidence.log_evidence == BEST - 1.0
+
+
+@pytest.mark.parametrize(
+    ("pair", "costly", "tried"), [(-60.0, False, True), (-80.0, False, False), (-60.0, True, False)]
+)
+def test_what_a_set_near_the_top_holds_is_tried_though_no_linear_step_led_there(pair, costly, tried):
+    """Gap and hum came in beside another effect; without it they were never weighed, and are the best set."""
+    descents = Descents(astray=-20.0, back=-20.0)
+    e = explored(descents, costly=costly)
+    e.weighed[frozenset({"hum", "gap", "other"})] = weighed(("hum", "gap", "other"), pair, mu=2.0)
+    e.weighed[frozenset({"hum", "other"})] = weighed(("hum", "other"), -70.0)
+    e.weighed[frozenset({"gap", "other"})] = weighed(("gap", "other"), -70.0)
+    for key in e.near(3, below=e.effort.given_up):
+        e.look_inside(key)
+    assert (frozenset({"hum", "gap"}) in e.weighed) is tried
+    assert [dict(s.values) for s in descents.starts] == ([{"mu": 2.0}] if tried else [])

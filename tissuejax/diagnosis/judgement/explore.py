@@ -92,10 +92,10 @@ class Exploration:
                 found.setdefault(self.names(key) | wide, key)
         return list(found.values())
 
-    def near(self, size: int, apart: bool = False) -> list[frozenset]:
-        """Those of `ranked` that other forms may bring to the top."""
-        top = self.worth(self.best)
-        return [k for k in self.ranked(size, apart) if self.worth(k) > top - self.effort.hopeful]
+    def near(self, size: int, apart: bool = False, below: float | None = None) -> list[frozenset]:
+        """Those of `ranked` that other forms may bring to the top, `below` it by so many nats (`Effort.hopeful`)."""
+        least = self.worth(self.best) - (self.effort.hopeful if below is None else below)
+        return [k for k in self.ranked(size, apart) if self.worth(k) > least]
 
     def parents(self, size: int) -> list[frozenset]:
         """Sets to grow: those near the top; all of `ranked` as long as the best one leaves more than is usual.
@@ -343,3 +343,12 @@ class Exploration:
         for k in parent.evidence.keys if len(key) > 1 or self.bench.costly else ():
             order = tuple(x for x in parent.evidence.keys if x != k)
             self.weigh(order, [parent.refit.values], v=parent.v, bench=parent.bench)
+
+    def look_inside(self, key: frozenset) -> None:
+        """Weigh what a set holds with one effect less, where that was never tried: an effect that a linear step ranks
+        low may have come in as the third, beside one that had its place."""
+        parent = self.weighed[key]
+        for k in parent.evidence.keys if not self.bench.costly else ():
+            order = tuple(x for x in parent.evidence.keys if x != k)
+            if self.company(frozenset(order)) not in {self.company(w) for w in self.weighed}:
+                self.weigh(order, [parent.refit.values], bench=parent.bench)

@@ -106,6 +106,8 @@ def searched(bench: Bench, scales: Scales, base: Weighed, by: Setup) -> Explorat
             e.reshape(key)
         e.settle(size + 1)
         e.leave_out(e.best)
+        for key in e.near(size + 1, below=effort.given_up):
+            e.look_inside(key)
         e.settle(size)
     return e
 
