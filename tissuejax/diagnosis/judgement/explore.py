@@ -2,7 +2,7 @@
 
 At the fit of a set every candidate's linear step is scored (`nominate`). The best are weighed in full (`weigh`). Sets
 of two grow from the best single ones, sets of three from the best pairs, the best sets are tried in all their forms and
-with every effect left out.
+with every effect left out, and what other sets near the top hold with one effect less is weighed where it never was.
 """
 
 import itertools
