@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from importlib.metadata import version
 
 import numpy as np
@@ -67,9 +68,12 @@ class Diagnosis:
 
     def located(self) -> list[Located]:
         """Where the base model misses: in time, drive, channel, and in space where maps were made."""
-        a = self.answered
-        found = fitted_region(a.chosen.values, a.explained[0])
-        return [*locate(a.bench, a.empty.prediction), *found, *regions(self.maps)]
+        found = fitted_region(self.answered.chosen.values, self.answered.explained[0])
+        return [*self._base_misses, *found, *regions(self.maps)]
+
+    @cached_property
+    def _base_misses(self) -> list[Located]:
+        return locate(self.answered.bench, self.answered.empty.prediction)
 
     def as_dict(self) -> dict:
         """`result.json`."""

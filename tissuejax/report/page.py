@@ -40,10 +40,14 @@ def figures(subject: Any) -> list[dict[str, Any]]:
 
 
 def png(figure: Figure) -> bytes:
-    """A figure as PNG. What is laid out here stays so in other formats, which are drawn in two thirds of the time."""
+    """A figure as PNG. It is laid out once, before it is drawn: what has a layout engine matplotlib draws twice, and
+    in every format anew."""
+    figure.set_dpi(DPI)
+    if engine := figure.get_layout_engine():
+        engine.execute(figure)
+    figure.set_layout_engine(None)
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI)
-    figure.set_layout_engine("none")
     return buffer.getvalue()
 
 
