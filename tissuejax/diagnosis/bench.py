@@ -90,6 +90,17 @@ class Candidate:
 
 
 @dataclass
+class Spent:
+    """A count that a bench shares with all that are made from it (`Bench.nearer`, `Bench.anchored`, ...).
+
+    Attributes:
+        cost: of predictions, in those of the plain base model (see `Effort.spend`).
+    """
+
+    cost: float = 0.0
+
+
+@dataclass
 class Bench(abc.ABC):
     """A sample on the table.
 
@@ -103,7 +114,7 @@ class Bench(abc.ABC):
         candidates: by key.
         warnings: sentences for the reader.
         known: values of effects that the base model has already, by path; they are in every prediction.
-        spent: cost of all predictions so far, in those of the plain base model (see `Effort.spend`).
+        spent: what all predictions cost so far, those of benches made from this one too.
         estimated: whether `sigma` is a guess from the recordings themselves: standard errors then follow what the
             model leaves, be that more or less.
     """
@@ -118,7 +129,7 @@ class Bench(abc.ABC):
     start: dict[str, float]
     candidates: dict[str, Candidate]
     warnings: list[str] = field(default_factory=list)
-    spent: float = 0.0
+    spent: Spent = field(default_factory=Spent)
     known: dict[str, float] = field(default_factory=dict)
     estimated: bool = False
 

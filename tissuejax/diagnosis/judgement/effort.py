@@ -44,8 +44,8 @@ class Effort:
             fits gain less than half as much more or less than their steps promise.
         short: settings of a shape that are all tried where nothing is named yet, if they are no more. Ground: a linear
             step ranks directions of strong fibres badly.
-        spend: cost of all predictions (of the plain base model each) after which nothing new is begun.
-            Ground: cost; material tests spend a tenth of it.
+        spend: cost of a search's predictions (of the plain base model each) after which nothing new is begun.
+            Ground: cost, a quarter of an hour at most; the costliest three of 64 sealed cases spend a quarter of it.
         nested: searches and memories nested in a prediction at most. Ground: cost, which each multiplies.
         rounds, iterations: of fit and amplitudes in turn, and of a fit, where a set is weighed. Ground: cost.
         trial: iterations of a fit that only compares starts. Ground: cost.
@@ -77,7 +77,7 @@ class Effort:
     starts: int = 2
     worthwhile: float = 0.5
     short: int = 4
-    spend: float = 4e4
+    spend: float = 1e6
     nested: int = 2
     rounds: int = 4
     iterations: int = 12

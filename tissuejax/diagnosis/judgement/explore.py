@@ -38,6 +38,7 @@ class Exploration:
         scored: linear scores at each set that was extended.
         kept: where sets are kept for a search that is begun again.
         noise_of: the set whose residual the noise was read from; None for the base.
+        until: what may have been spent on predictions when a set is begun (`Effort.spend` for every search).
     """
 
     bench: Bench
@@ -50,6 +51,7 @@ class Exploration:
     exhausted: bool = False
     kept: Kept = field(default_factory=Kept)
     noise_of: Weighed | None = None
+    until: float = math.inf
 
     @cached_property
     def before(self) -> Beforehand:
@@ -139,7 +141,7 @@ class Exploration:
         key, effort = frozenset(order), self.effort
         if key in self.weighed and v is None:
             return self.weighed[key]
-        if order and self.bench.spent > effort.spend:
+        if order and self.bench.spent.cost > self.until:
             self.exhausted = True
             return None
         self.tell("weighing", order)
