@@ -120,8 +120,12 @@ def test_mean_and_spreads_are_found_again_and_specimens_shrink(rng):
     assert low < 0.3 < high
     shrunken, std = found.specimens()
     x, S = of.working
-    assert (np.mean((shrunken - theta) ** 2, 0) < np.mean((x - theta) ** 2, 0)).all()
-    assert (std < np.sqrt(np.einsum("nii->ni", S)) * 1.02).all()
+    # nearer than measurements are by their variance (these may lie nearer by luck), and as near as they say: of 80
+    # squares of unit variance the mean lies between 0.59 and 1.53 but for three in a thousand
+    variance = np.einsum("nii->ni", S)
+    assert (np.mean((shrunken - theta) ** 2, 0) < np.mean(variance, 0)).all()
+    assert 0.59 < np.mean(((shrunken - theta) / std) ** 2) < 1.53
+    assert (std < np.sqrt(variance) * 1.02).all()
     new = np.log(found.new()[:, 0])
     n = len(set(of.group))
     means = [theta[k::n, 0].mean() for k in range(n)]
