@@ -38,7 +38,7 @@ def test_every_search_may_spend_as_much_as_the_first(monkeypatch):
     monkeypatch.setattr(search, "noise_beside", again)
     asked = asked_of(sample(), "neo-hookean", effects=("drift", "aging"))
     cut, of = asked.left()
-    cost = search.explore(asked.searched(cut), cut, of, search.Setup(effort=Effort(readings=0))).bench.spent.cost
+    cost = search.explore(asked.searched(cut), cut, of, search.Setup(effort=Effort(readings=0))).bench.spent
     last = search.explore(asked.searched(cut), cut, of, search.Setup(effort=Effort(spend=1.1 * cost)))
     assert len(ends) == 2
     assert all(e.weighed.keys() == last.weighed.keys() and not e.exhausted for e in (*ends, last))
@@ -47,6 +47,6 @@ def test_every_search_may_spend_as_much_as_the_first(monkeypatch):
 def test_what_benches_made_from_one_spend_counts():
     asked = asked_of(sample(), "neo-hookean", effects=("drift", "aging"))
     bench = asked.searched(asked.left()[0])
-    near, before = bench.anchored(bench.start), bench.spent.cost
+    near, before = bench.anchored(bench.start), bench.spent
     near.predict({p: bench.start[p] for p in bench.base})
-    assert bench.spent.cost == before + len(bench.fitted)
+    assert bench.spent == before + len(bench.fitted)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tests.diagnosis.test_nearly import relaxing
-from tissuejax.diagnosis.bench import Spent
 from tissuejax.diagnosis.diagnose import asked_of
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.effort import Course, Effort
@@ -42,7 +41,7 @@ class Descents(Kept):
 def explored(descents: Descents, hum: float = BEST, costly: bool = False) -> Exploration:
     does = {"hum": ("height",), "gap": ("width",), "other": ()}
     candidates = {k: SimpleNamespace(name=k, widens={}, amplitudes=a) for k, a in does.items()}
-    bench = SimpleNamespace(candidates=candidates, costly=costly, spent=Spent(), start={"height": 0.0, "width": 0.0})
+    bench = SimpleNamespace(candidates=candidates, costly=costly, spent=0.0, start={"height": 0.0, "width": 0.0})
     sets = {frozenset(): weighed((), -90.0), frozenset({"gap"}): weighed(("gap",), -60.0)}
     sets |= {
         frozenset({"hum"}): weighed(("hum",), hum, mu=3.0, height=2.0),

@@ -94,7 +94,7 @@ class Spent:
     """A count that a bench shares with all that are made from it (`Bench.nearer`, `Bench.anchored`, ...).
 
     Attributes:
-        cost: of predictions, in those of the plain base model (see `Effort.spend`).
+        cost: of predictions, in those of the plain base model.
     """
 
     cost: float = 0.0
@@ -114,7 +114,7 @@ class Bench(abc.ABC):
         candidates: by key.
         warnings: sentences for the reader.
         known: values of effects that the base model has already, by path; they are in every prediction.
-        spent: what all predictions cost so far, those of benches made from this one too.
+        counted: what predictions cost, shared with the benches made from this one.
         estimated: whether `sigma` is a guess from the recordings themselves: standard errors then follow what the
             model leaves, be that more or less.
     """
@@ -129,7 +129,7 @@ class Bench(abc.ABC):
     start: dict[str, float]
     candidates: dict[str, Candidate]
     warnings: list[str] = field(default_factory=list)
-    spent: Spent = field(default_factory=Spent)
+    counted: Spent = field(default_factory=Spent)
     known: dict[str, float] = field(default_factory=dict)
     estimated: bool = False
 
@@ -152,6 +152,11 @@ class Bench(abc.ABC):
     def settings(self, candidate: Candidate, prediction: Float[np.ndarray, " N"]) -> Sequence[Mapping[str, float]]:
         """Shapes at which to score a candidate; a bench may read some from the residual (a period, a place)."""
         return candidate.grid
+
+    @property
+    def spent(self) -> float:
+        """Cost of all predictions so far, in those of the plain base model (see `Effort.spend`)."""
+        return self.counted.cost
 
     @property
     def forms(self) -> dict[str, int]:

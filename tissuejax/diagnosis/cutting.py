@@ -146,7 +146,7 @@ class CuttingBench(Bench):
                 vector = jnp.asarray(self._vector(values, s.recording))
                 found = of(self._key, vector, *self._paths[s.recording])
                 out[s.rows] = np.asarray(found)[self._kept[s.recording]]
-        self.spent.cost += 1.0 if of is _force else 10.0
+        self.counted.cost += 1.0 if of is _force else 10.0
         return out
 
 

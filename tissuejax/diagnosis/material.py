@@ -259,7 +259,7 @@ class MaterialBench(Bench):
     def _run(self, runs: Sequence[tuple[Program, Float[np.ndarray, " p"], str]]) -> list[Float[np.ndarray, "n ..."]]:
         """Predictions of recordings; NaN where the faces of a specimen could not be found at such parameters. All are
         begun before the first is waited for: they run beside each other where there are cores."""
-        self.spent.cost += sum(program.price for program, _, _ in runs)
+        self.counted.cost += sum(program.price for program, _, _ in runs)
         begun = [self._found(lambda p=p, t=t, n=n: self._begun(p, t, n), n) for p, t, n in runs]
         return [self._found(lambda y=y: np.asarray(y), name) for y, (_, _, name) in zip(begun, runs, strict=True)]
 

@@ -103,11 +103,7 @@ class ProbingView(Bench):
     @property
     def spent(self) -> float:
         """Cost of all runs so far, in predictions of the coarse simulation."""
-        return 0.0 if not hasattr(self, "source") else self.source.runs.cost / len(self.source.runs.rows)
-
-    @spent.setter
-    def spent(self, value: float) -> None:
-        pass  # the runs count themselves
+        return self.source.runs.cost / len(self.source.runs.rows)
 
     @property
     def shown(self) -> ProbingBench:

@@ -141,7 +141,7 @@ class Exploration:
         key, effort = frozenset(order), self.effort
         if key in self.weighed and v is None:
             return self.weighed[key]
-        if order and self.bench.spent.cost > self.until:
+        if order and self.bench.spent > self.until:
             self.exhausted = True
             return None
         self.tell("weighing", order)

@@ -152,7 +152,7 @@ def alone(bench: Bench, scales: Scales, base: Weighed, by: Setup) -> Exploration
     """An exploration with the base and all single effects weighed."""
     rooted(scales, base, bench.free)
     sets, effort = {frozenset(): base}, by.effort
-    until = scales.bench.spent.cost + effort.spend
+    until = scales.bench.spent + effort.spend
     e = Exploration(scales.bench, by.criteria, effort, scales, by.report, sets, kept=by.kept, until=until)
     e.extend([frozenset()], effort.singles, effort.singles)
     for key in e.near(1)[: effort.reshaped[0]]:
