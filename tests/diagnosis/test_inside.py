@@ -65,6 +65,13 @@ def test_a_set_far_below_one_inside_it_is_followed_from_there():
     assert second.v == np.array([BEST])
 
 
+def test_shapes_are_those_of_the_first_start_and_far_below_is_less_than_hopeful():
+    descents = Descents(astray=BEST - 9.0, back=-45.0)
+    e = explored(descents)
+    e.weigh(("hum", "gap"), [{"edge": 5.0}, {"edge": 6.0}])
+    assert descents.starts[-1].values == {"mu": 3.0, "height": 2.0, "width": 0.0, "edge": 5.0}
+
+
 def test_what_ends_lower_there_is_not_taken():
     e = explored(Descents(astray=-500.0, back=-600.0))
     e.weigh(("hum", "gap"), [{}])
@@ -82,6 +89,14 @@ def test_elsewhere_one_descent_is_enough(astray, hum, costly):
     e.weighed[frozenset({"gap"})].evidence.log_evidence = -300.0
     e.weigh(("hum", "gap"), [{}])
     assert len(descents.starts) == 1
+
+
+def test_what_a_set_is_without_its_idle_effect_is_weighed_once():
+    idle = Idle(BEST + 5.0)
+    e = explored(idle)
+    e.weighed[frozenset({"other", "hum"})] = weighed(("other", "hum"), -60.0)
+    e.weigh(("other", "hum", "gap"), [{}])
+    assert len(idle.asked) == 1
 
 
 class Idle(Kept):

@@ -40,6 +40,7 @@ SINGLES = {(): -90.0, (WIDE,): -50.0, (TERMS,): -51.0, ("law/others",): -52.0, (
 def test_a_law_of_a_few_terms_is_grown_beside_one_that_is_anything_smooth():
     e = explored(SINGLES, wide=False)
     assert e.ranked(1) == [{WIDE}, {HUM}]  # of each effect one, for its other forms
+    assert e.near(1) == [{WIDE}, {HUM}]
     assert e.parents(1) == [{WIDE}, {TERMS}, {HUM}]
 
 
