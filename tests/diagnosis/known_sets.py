@@ -38,7 +38,7 @@ def weighed(keys: tuple[str, ...], worth: float, void: bool = False, **values: f
 
 
 class Known(Kept):
-    """Weighing comes to what a table says, a thousand nats below the base where it says nothing."""
+    """Weighing comes to what a table says, and to -1000 nats where it says nothing."""
 
     def __init__(self, table: dict[tuple[str, ...], float]):
         super().__init__()
