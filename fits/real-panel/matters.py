@@ -2,8 +2,8 @@
 
 tissuejax/diagnosis/judgement/numbers.py lists the numbers by path. What sets are weighed by is changed beside the sets
 that a search with the usual numbers had found, each from where it came to rest; what decides which sets are tried, or
-what is looked for in the recordings first, is searched anew; what a judge alone reads is judged anew. Stopped, it goes
-on where it was (runs/matters/).
+what is looked for in the recordings first, is searched anew, no set of a sample weighed twice (remembered.py); what a
+judge alone reads is judged anew. Stopped, it goes on where it was (runs/matters/).
 
 python fits/real-panel/matters.py list                        all numbers, and which way each is asked
 python fits/real-panel/matters.py found                       search with the usual numbers (once; 6 minutes of a core)
@@ -31,9 +31,11 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
 import panel_samples  # noqa: E402
+from remembered import Remembered  # noqa: E402
 from study import file_of  # noqa: E402
+from threadpoolctl import threadpool_limits  # noqa: E402
 
-import tissuejax as tj  # noqa: E402
+from tissuejax.cache.programs import keep_programs  # noqa: E402
 from tissuejax.cache.source import LOADED  # noqa: E402
 from tissuejax.challenge.panel import Answer, answered, read_causes  # noqa: E402
 from tissuejax.diagnosis.diagnose import asked_of  # noqa: E402
@@ -42,6 +44,7 @@ from tissuejax.diagnosis.judgement.evidence import read_evidence, write_evidence
 from tissuejax.diagnosis.judgement.judge import judge  # noqa: E402
 from tissuejax.diagnosis.judgement.numbers import Numbers  # noqa: E402
 from tissuejax.diagnosis.judgement.reweigh import Found, reweighed  # noqa: E402
+from tissuejax.diagnosis.judgement.search import Setup, explore  # noqa: E402
 from tissuejax.errors import InputError  # noqa: E402
 from tissuejax.progress import for_terminal  # noqa: E402
 from tissuejax.report.matters import matters_figure  # noqa: E402
@@ -95,14 +98,19 @@ def name_of(path: str, factor: float) -> str:
     return USUAL if path == USUAL else f"{path} x {factor:g}"
 
 
-def searched(entry: panel_samples.Entry, at: Numbers) -> tuple[dict, Found]:
-    """The verdict of a search, and what it leaves to be weighed again."""
+def searched(entry: panel_samples.Entry, at: Numbers, kept: Remembered | None = None) -> tuple[dict, Found]:
+    """The verdict of a search, and what it leaves to be weighed again.
+
+    Args:
+        kept: sets that other searches of the sample have weighed.
+    """
     sample, held = panel_samples.build(entry)
-    said = tj.diagnose(
-        sample, entry.energy, holdout=held, ogden_form=entry.ogden_form, criteria=at.criteria, effort=at.effort
-    )
-    found = Found.of(said.answered.exploration, said.answered.evidence.held_out)
-    return rejudge.verdict_of(said.answered.judgement, at.criteria), found
+    asked = asked_of(sample, entry.energy, held, entry.ogden_form, criteria=at.criteria)
+    cut, of = asked.left()
+    found = explore(asked.searched(cut), cut, of, Setup(at.criteria, at.effort, kept=kept or Remembered()))
+    evidence = found.evidence(asked.bench.fitted, asked.bench.held_out)
+    said = rejudge.verdict_of(judge(evidence, at.criteria), at.criteria)
+    return said, Found.of(found, evidence.held_out)
 
 
 def weighed(entry: panel_samples.Entry, path: str, at: Numbers, found: Found) -> dict:
@@ -119,14 +127,14 @@ def weighed(entry: panel_samples.Entry, path: str, at: Numbers, found: Found) ->
     return rejudge.verdict_of(judge(evidence, at.criteria), at.criteria)
 
 
-def answer(entry: panel_samples.Entry, path: str, factor: float) -> None:
-    """Ask one sample, unless it was asked before."""
+def answer(entry: panel_samples.Entry, path: str, factor: float, sets: Remembered) -> None:
+    """Ask one sample, unless it was asked before; `sets` that were weighed for it."""
     kept = file_of(RUNS, entry.id, name_of(path, factor).replace(" ", "-"))
     if kept.exists():
         return
     base = file_of(RUNS, entry.id, "found")
     if not base.exists():
-        verdict, found = searched(entry, Numbers())
+        verdict, found = searched(entry, Numbers(), sets)
         write_json(base, {"searched": verdict, "found": found.as_dict()})
     if path == "found":
         return
@@ -138,7 +146,7 @@ def answer(entry: panel_samples.Entry, path: str, factor: float) -> None:
                 "weighed": weighed(entry, path, Numbers(), Found.read(stored["found"])),
             }
         elif under(path, SEARCHED):
-            said = {"searched": searched(entry, Numbers().changed(path, factor))[0]}
+            said = {"searched": searched(entry, Numbers().changed(path, factor), sets)[0]}
         else:
             said = {"weighed": weighed(entry, path, Numbers().changed(path, factor), Found.read(stored["found"]))}
     except Exception as error:  # a number may make a sample impossible: that is an answer too
@@ -262,10 +270,13 @@ def main(given: Sequence[str]) -> str:
         return table()
     part, parts = (int(n) for n in os.environ.get("MATTERS_PART", "0/1").split("/"))
     mine, asked = samples()[part::parts], list(questions(list(given)))
-    with for_terminal().stage(f"{len(asked)} questions to {len(mine)} samples", len(asked) * len(mine)) as stage:
-        for path, factor in asked:
-            for entry in mine:
-                answer(entry, path, factor)
+    whole = for_terminal().stage(f"{len(asked)} questions to {len(mine)} samples", len(asked) * len(mine))
+    with whole as stage, threadpool_limits(1, "blas"):
+        keep_programs()
+        for entry in mine:
+            sets = Remembered()
+            for path, factor in asked:
+                answer(entry, path, factor, sets)
                 stage.advance(note=f"{name_of(path, factor)}: {entry.id}")
     return table() if parts == 1 and asked[0][0] != "found" else "kept in runs/matters"
 

@@ -351,6 +351,23 @@ def test_sobol_indices_of_a_product_are_those_by_hand(rng):
     assert (found.n, found.failed) == (5 * 1024, 0.0)
 
 
+def test_sobol_indices_are_told_by_component(rng):
+    """Two components, one that a parameter moves and one that the other does; a third that neither moves has none."""
+
+    class Apart(ToyPredictor):
+        def predict(self, values):
+            t = self._time("r1")
+            y = jnp.stack([values["energy.a"] * t, values["energy.offset"] * t, t], axis=1)
+            return {"r1": self._recording("r1", y)}
+
+    ranges = {"energy.a": (50.0, 150.0), "energy.offset": (-10.0, 10.0)}
+    found = sobol(Apart(toy_sample(rng, TRUE, n=9, names=("r1",))), TRUE, ranges, n=256)
+    keys = [f"r1/nominal_stress[{i}]" for i in range(3)]
+    assert list(found.first) == list(found.total) == keys
+    for told in (found.first, found.total):
+        np.testing.assert_allclose([told[k] for k in keys], [[1, 0], [0, 1], [0, 0]], atol=0.02)
+
+
 @pytest.mark.parametrize("n", [0, 1, 3, 96])
 def test_sobol_draws_that_are_no_power_of_two_are_refused(rng, n):
     ranges = {"energy.a": (50.0, 150.0), "energy.rate": (0.2, 1.0)}
