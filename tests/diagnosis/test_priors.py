@@ -19,6 +19,7 @@ from tissuejax.diagnosis.judgement.scales import log_prior
         (-1.0, 2.0, (5.0, 0.7)),  # the mean lies outside: a tail alone
         (6.0, 7.0, (0.0, 1.0)),  # and far outside, to either side
         (-9.0, -8.0, (0.0, 1.0)),
+        (9.0, 9.5, (0.0, 1.0)),  # where the distribution is one to rounding
     ],
 )
 def test_a_prior_between_bounds_is_a_density(low, high, prior):
