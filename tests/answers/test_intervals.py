@@ -132,6 +132,13 @@ def test_the_evidence_of_a_linear_law_is_the_integral():
     r = np.asarray(data) - 900 * X
     by_hand = -0.5 * (r @ np.linalg.solve(cov, r) + np.linalg.slogdet(cov)[1] + 40 * math.log(2 * math.pi))
     assert evidence(Target(prior.problem), 400, 3).log_evidence == pytest.approx(by_hand, abs=0.15)
+    narrow = tj.fit(sample(0.95), "neo-hookean", search=ONCE, unknowns=tj.Unknowns(priors={"energy.mu": (800.0, s)}))
+    weak = evidence(Target(narrow.problem), 4000, 3)
+    assert weak.rungs == 1  # so wide beside the prior that one step leads there: the mean over draws of the prior
+    cov, r = SIGMA**2 * np.eye(40) + s**2 * np.outer(X, X), np.asarray(data) - 800 * X
+    by_hand = -0.5 * (r @ np.linalg.solve(cov, r) + np.linalg.slogdet(cov)[1] + 40 * math.log(2 * math.pi))
+    assert weak.log_evidence == pytest.approx(by_hand, abs=0.03)
+    assert weak.draws.std() == pytest.approx(s / math.sqrt(2), rel=0.05)  # as much is known from both
     with pytest.raises(InputError, match="proper priors"):
         evidence(Target(tj.fit(sample(), "neo-hookean", search=ONCE).problem))
 

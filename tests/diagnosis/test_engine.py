@@ -33,6 +33,18 @@ def test_one_effect_is_found_with_its_parameters():
     assert found.rest()["unit"] == "N"
 
 
+def test_what_is_shown_is_counted_over_the_stated_noise_in_and_out_of_the_fit():
+    found = judged(spring({"relax.g": 0.2, "relax.tau": 0.6}), QUICK)
+    bench, n = found.bench, len(found.bench.segments[0].time)
+    assert found.chosen is found.refits[frozenset({"relax"})]
+    for fit in (found.empty, found.chosen):
+        z = (bench.y - fit.prediction) / 0.05
+        assert (fit.n, fit.n_held) == (2 * n, n)
+        assert fit.chi2 == pytest.approx(np.sum(z[: 2 * n] ** 2))
+        assert fit.held == pytest.approx(np.sum(z[2 * n :] ** 2))
+    assert 0.8 < found.chosen.chi2 / found.chosen.n < 1.2 < found.empty.chi2 / found.empty.n
+
+
 def test_two_effects_are_found_together():
     truth = {"relax.g": 0.15, "relax.tau": 1.0, "wave.s": 0.3, "wave.period": 2.3}
     assert set(judged(spring(truth), QUICK).judgement.names) == {"relax", "wave"}
