@@ -2,13 +2,15 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from straight_bench import GAIN, MEANS, SIGMA, averaged, covariance, flat, half_normal, scales_of, straight
 
+from tissuejax.diagnosis.bench import Candidate
 from tissuejax.diagnosis.judgement.criteria import Criteria
-from tissuejax.diagnosis.judgement.weigh import Start, beside, kurtosis, weigh
+from tissuejax.diagnosis.judgement.weigh import Start, _idle, _resting, beside, kurtosis, weigh
 from tissuejax.estimation.discrepancy import Part
 
 USUAL = Criteria()
@@ -191,3 +193,53 @@ def test_the_rest_is_what_the_discrepancy_is_expected_to_be():
     assert found.evidence.rest[0] == pytest.approx(np.mean(mean**2 + spread), rel=1e-9)
     each = 2 * spread**2 + 4 * spread * mean**2
     assert found.evidence.rest[1] == pytest.approx(math.sqrt(USUAL.alike * each.sum()) / len(mean), rel=1e-9)
+
+
+def fitted(**values):
+    """A fit of the straight bench at `values`."""
+    bench = straight({})
+    return bench, SimpleNamespace(values=values, prediction=bench.predict(values))
+
+
+@pytest.mark.parametrize(("v", "rests"), [([0.0, 0.3], True), ([1e-12, 0.0], False), ([0.0, 0.0], True)])
+def test_what_only_widens_rests_where_its_families_are_at_nothing(v, rests):
+    bench, fit = fitted(**AT)
+    scatter = Candidate("scatter", (), widens={"gain": 0.15})
+    assert _resting(scatter, fit, bench, (), np.array(v), ("gain", "slow")) == rests
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "bound", "rests"),
+    [
+        (0.0, 0.0, ("shift.x", "shift.y"), True),
+        (0.0, 0.0, ("shift.x",), False),  # one of its amplitudes may still move
+        (0.0, 1.1e-7, ("shift.x", "shift.y"), False),  # on a bound that is not neutral: more than 1e-6 of its scale
+        (0.0, 0.9e-7, ("shift.x", "shift.y"), True),
+    ],
+)
+def test_an_effect_rests_where_all_its_amplitudes_are_neutral_and_on_their_bounds(x, y, bound, rests):
+    bench, fit = fitted(**AT, **{"shift.x": x, "shift.y": y})
+    assert _resting(bench.candidates["shift"], fit, bench, bound, np.zeros(1), ("gain",)) == rests
+
+
+def test_an_effect_is_idle_where_the_fit_predicts_the_same_without_it():
+    bench, fit = fitted(**AT, **{"own.x": 0.0, "push.k": 2.0})
+    own, push, scatter = bench.candidates["own"], bench.candidates["push"], Candidate("scatter", (), widens={"gain": 1})
+    told = {"own.x": 1.0, "push.k": 1.0}
+    assert _idle(own, fit, bench, 40.0, told)
+    assert not _idle(push, fit, bench, 40.0, told)
+    assert not _idle(scatter, fit, bench, 40.0, told)
+    least = 2.0 * np.max(np.abs(bench.column("push.k", 0.3))) / 1e-12  # of a peak beyond which all of it is rounding
+    assert _idle(push, fit, bench, 1.01 * least, told)
+    assert not _idle(push, fit, bench, 0.99 * least, told)
+
+
+@pytest.mark.parametrize(("slope", "simulated"), [(1.1e-5, False), (0.9e-5, True)])
+def test_where_predictions_are_costly_a_slope_tells_that_an_effect_does_something(slope, simulated):
+    """Moved by 4 it changes 1e-6 of a peak of 40 Pa and more: no simulation is spent on it."""
+    bench, fit = fitted(**AT, **{"push.k": 4.0})
+    asked = []
+    bench.__class__ = type("Costly", (type(bench),), {"costly": True})
+    bench.predict = lambda values: asked.append(values) or fit.prediction
+    assert _idle(bench.candidates["push"], fit, bench, 40.0, {"push.k": slope}) == simulated
+    assert [a["push.k"] for a in asked] == [0.0] * simulated
