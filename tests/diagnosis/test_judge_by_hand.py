@@ -152,3 +152,12 @@ def test_the_prior_of_one_part_is_its_own():
     own = w.part(1)
     assert (own.width.tolist(), own.chance.tolist(), own.factor.tolist()) == ([2.0], [0.2], [20.0])
     assert Widths(w.width, w.chance, 7.0).part(2).factor.tolist() == [7.0]
+
+
+def test_an_amplitude_is_likelier_a_wide_one_from_where_the_densities_cross():
+    """Of (1 - c) HN(w) and c HN(f w): a^2 / w^2 = 2 log((1 - c) f / c) / (1 - 1 / f^2)."""
+    width, chance, factor = np.array([2.0, 0.01, 1.0]), np.array([0.1, 0.3, 0.0]), np.array([10.0, 4.0, 10.0])
+    w = Widths(width, chance, factor)
+    cross = 2 * np.log((1 - chance[:2]) * factor[:2] / chance[:2]) / (1 - factor[:2] ** -2.0) * width[:2] ** 2
+    assert w.wider(np.array([*0.99 * cross, 1e3])).tolist() == [False, False, False]
+    assert w.wider(np.array([*1.01 * cross, 1e9])).tolist() == [True, True, False]

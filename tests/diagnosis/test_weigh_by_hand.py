@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from straight_bench import GAIN, MEANS, SIGMA, averaged, covariance, flat, half_normal, scales_of, straight
+from straight_bench import DRIVE, GAIN, MEANS, SIGMA, averaged, covariance, flat, half_normal, scales_of, straight
 
 from tissuejax.diagnosis.bench import Candidate
 from tissuejax.diagnosis.judgement.criteria import Criteria
@@ -47,6 +47,23 @@ def test_the_evidence_of_the_base_is_the_integral_over_all_that_is_open(gain):
     y, jac = scales.cut.mean(bench.y), columns(scales, "a", "b")
     assert found.log_evidence == pytest.approx(over_gain(scales, y, jac, covariance(scales, [], [])), abs=0.05)
     assert found.fit + found.parameters + found.discrepancy == pytest.approx(found.log_evidence, abs=1e-9)
+
+
+@pytest.mark.parametrize(("size", "counts"), [(1e3, True), (1e2, False)])
+def test_a_constant_counts_where_it_does_more_than_rounding_moved_by_its_scale(size, counts):
+    """1e-13 N per unit: a thousand units of it are more than 1e-12 of the peak of 45 N, a hundred are less."""
+    bench = straight({}, seed=1)
+    bench.base = ("a", "b", "hardly.k")
+    bench.free = bench.free | {"hardly.k": replace(bench.free["a"], scale=size)}
+    bench.start = bench.start | {"hardly.k": 0.0}
+    usual = bench.column
+    bench.column = lambda path, onset: 1e-13 * DRIVE**2 if path == "hardly.k" else usual(path, onset)
+    scales = scales_of(bench)
+    found = weigh(scales, (), Start({**AT, "hardly.k": 0.0}), USUAL)
+    y, k = scales.cut.mean(bench.y), covariance(scales, [], [])
+    jac = columns(scales, "a", "b", "hardly.k") / [1.0, 1.0, 1e-13]
+    expected = over_gain(scales, y, jac, k) - math.log(1e-13) if counts else over_gain(scales, y, jac[:, :2], k)
+    assert found.evidence.log_evidence == pytest.approx(expected, abs=0.05)
 
 
 CASES = [  # what acts, its size, what is freed, its share of the stress (None: what was noted)
