@@ -7,8 +7,10 @@ import pytest
 
 from tissuejax.estimation.rules import sizes
 from tissuejax.fitting.evidence import _next, _systematic
+from tissuejax.fitting.least_squares import _scatter
 from tissuejax.fitting.profile import crossing
 from tissuejax.fitting.separable import Projection
+from tissuejax.fitting.serial import Serial
 
 
 @pytest.mark.parametrize("at", [[2.0, 1.5, 3.5, -1.0, 0.5, 5.0, 2.5, -2.0, 4.5], list(np.linspace(-3.0, 7.0, 21))])
@@ -57,3 +59,18 @@ def test_what_moduli_can_do_is_projected_out_and_nothing_else():
     held = of._projected(np.column_stack([three, other]), np.array([1.0, 0.0, 0.0, 1.0, 1.0]))  # two on their bounds
     one = two[:, :1] / np.linalg.norm(two[:, 0])
     np.testing.assert_allclose(held, other - one @ (one.T @ other), atol=1e-12)
+
+
+@pytest.mark.parametrize(("small", "dependent", "left"), [(1.0, False, 37), (1e-12, False, 37), (1e-12, True, 38)])
+def test_degrees_of_freedom_are_less_by_what_columns_of_any_size_can_do(rng, small, dependent, left):
+    """Of 40 independent residuals three columns take up three; one that does what another does takes up none."""
+    jacobian = rng.standard_normal((40, 3))
+    jacobian[:, 2] = small * (jacobian[:, 1] if dependent else jacobian[:, 2])
+    r = rng.standard_normal(40)
+    estimated, known = (SimpleNamespace(noise=SimpleNamespace(estimated=e)) for e in (True, False))
+    assert _scatter(estimated, r, jacobian, Serial()) == pytest.approx((np.sqrt(r @ r / left), left))
+    level = np.sqrt(left / (r @ r))  # chi-square as expected: the recorded noise is believed
+    assert _scatter(known, level * r, jacobian, Serial()) == (1.0, np.inf)
+    for beyond, widened in ((3.4, False), (3.6, True)):  # standard deviations of chi-square
+        size = level * np.sqrt(1 + beyond * np.sqrt(2 / left))
+        assert (_scatter(known, size * r, jacobian, Serial())[0] > 1) == widened

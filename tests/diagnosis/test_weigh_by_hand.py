@@ -6,10 +6,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.special import logsumexp
 from straight_bench import DRIVE, GAIN, MEANS, SIGMA, averaged, covariance, flat, half_normal, scales_of, straight
 
 from tissuejax.diagnosis.bench import Candidate
 from tissuejax.diagnosis.judgement.criteria import Criteria
+from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, amplitudes, marginal
+from tissuejax.diagnosis.judgement.mass import amplitude_mass
 from tissuejax.diagnosis.judgement.weigh import Start, _idle, _resting, beside, kurtosis, weigh
 from tissuejax.estimation.discrepancy import Part
 
@@ -260,3 +263,27 @@ def test_where_predictions_are_costly_a_slope_tells_that_an_effect_does_somethin
     bench.predict = lambda values: asked.append(values) or fit.prediction
     assert _idle(bench.candidates["push"], fit, bench, 40.0, {"push.k": slope}) == simulated
     assert [a["push.k"] for a in asked] == [0.0] * simulated
+
+
+def test_amplitudes_that_the_data_hardly_tell_apart_are_not_taken_one_by_one():
+    """Two parts that are nearly one: more of the one is less of the other. Against a sum over both amplitudes, their
+    mass errs by less than half of what it would by with their correlation left out."""
+    widths, n, q, sigma = Widths(np.full(2, 0.5), np.full(2, 0.1)), 40, 12, 0.1
+    a, blocked = (np.arange(48) + 0.5) / 16, Blocked((slice(0, n),), np.full(n, sigma))
+    with_it, without = [], []
+    for seed in range(4, 8):
+        rng = np.random.default_rng(seed)
+        one, other = (np.linalg.qr(rng.standard_normal((n, q)))[0] for _ in range(2))
+        other = 0.998 * one + math.sqrt(1 - 0.998**2) * other
+        residual = one @ rng.normal(0, 1, q) + other @ rng.normal(0, 1, q) + sigma * rng.standard_normal(n)
+        parts = [Part("one", "law", one), Part("other", "gain", other)]
+        linear = Linear(residual, np.ones((n, 1)), np.zeros(1), np.zeros(1))
+        v, m = amplitudes(linear, parts, widths, blocked, np.ones(2))
+        squares = [np.array([x, y]) ** 2 for x in a for y in a]
+        whole = [marginal(linear, parts, u, blocked).value + np.sum(widths.log_density(u)) for u in squares]
+        expected = float(logsumexp(whole)) - 2 * math.log(16) - m.value
+        found = amplitude_mass(linear, parts, widths, blocked, v, m)
+        apart = m.fisher / np.sqrt(np.outer(np.diag(m.fisher), np.diag(m.fisher)))
+        with_it.append(abs(found - expected))
+        without.append(abs(found + 0.5 * np.linalg.slogdet(apart)[1] - expected))
+    assert np.mean(with_it) < 0.5 * np.mean(without)
