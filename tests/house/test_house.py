@@ -138,6 +138,14 @@ def test_the_longest_files_of_the_suite_are_there():
     assert set(LONGEST) <= {p.stem for p in OURS}
 
 
+def test_no_two_files_of_tests_are_one_module():
+    """In a folder without __init__.py a file is a module by its name alone; a second one can't be collected."""
+    files = [p for p in (PROJECT / "tests").rglob("*.py") if p.name != "__init__.py"]
+    names = [p.name for p in files if not (p.parent / "__init__.py").exists()]
+    assert sorted(n for n in set(names) if names.count(n) > 1) == []
+    assert len(names) > 100
+
+
 def test_no_vague_names():
     vague = {"utils", "helpers", "base", "misc", "common"}
     assert not [p for p in FILES if p.stem in vague]
