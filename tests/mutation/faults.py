@@ -38,7 +38,7 @@ FAULTS = (
     Fault("cache: double precision left out of the key", "cache/key.py",
           "(c.jax_enable_x64, c.jax_debug_nans", "(c.jax_debug_nans", "tests/test_cache.py -k settings_are_part"),
     Fault("cache: shapes left out of the key", "cache/programs.py",
-          "(np.shape(x), np.result_type(x).str)", "(np.result_type(x).str,)", "tests/test_cache.py -k text_or_shape"),
+          "(x.shape, x.dtype) for x", "(x.dtype,) for x", "tests/test_cache.py -k text_or_shape"),
     Fault("errors: widening not squared in the covariance", "estimation/covariance.py",
           "(found.u))) * widening**2", "(found.u))) * widening", f"{FIT} -k widening_goes"),
     Fault("errors: a misfit beyond the noise does not widen", "fitting/least_squares.py",
