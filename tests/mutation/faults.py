@@ -31,6 +31,8 @@ class Fault(NamedTuple):
 
 
 FIT, LEVEL = "tests/recover/test_least_squares.py", "tests/estimation/test_level.py"
+LIKELIHOOD = "tests/estimation/test_correlation.py -k 'likelihood_is_that'"
+WALK = "        aa = aa + 2 * dt * ab + dt**2 * bb + walk"
 FAULTS = (
     Fault("cache: contents of files left out of the key", "cache/source.py",
           'len(content)}\\n".encode() + content)', 'len(content)}\\n".encode())',
@@ -56,9 +58,10 @@ FAULTS = (
     Fault("score: columns not projected", "diagnosis/score.py",
           "columns = columns - basis @ (basis.T @ columns)", "columns = columns - 0 * basis @ (basis.T @ columns)",
           "tests/diagnosis/test_engine.py -k 'gain_of_a_linear_refit'"),
-    Fault("noise: the mismatch falls as f^-2", "estimation/correlation.py",
-          "aa = aa + 2 * dt * ab + dt**2 * bb + walk * dt**3 / 3", "aa = aa + 2 * dt * ab + dt**2 * bb + walk * dt",
-          "tests/estimation/test_correlation.py -k 'likelihood_is_that'"),
+    Fault("noise: the mismatch falls as f^-2, low-pass of first order", "estimation/correlation.py",
+          f"share * (1 - fade**2)\n{WALK} * dt**3 / 3", f"share * (1 - fade**2)\n{WALK} * dt", LIKELIHOOD),
+    Fault("noise: the mismatch falls as f^-2, low-pass of second order", "estimation/correlation.py",
+          f"        )\n{WALK} * dt**3 / 3", f"        )\n{WALK} * dt", LIKELIHOOD),
     Fault("noise not recorded: median times 0.6745", "estimation/level.py",
           "np.median(np.abs(d)) / 0.6745", "np.median(np.abs(d)) * 0.6745", f"{LEVEL} -k neighbours_alone"),
     Fault("step: relaxation on the simulated clock", "tled/step.py",
