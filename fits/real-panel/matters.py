@@ -3,7 +3,7 @@
 tissuejax/diagnosis/judgement/numbers.py lists the numbers by path. What sets are weighed by is changed beside the sets
 that a search with the usual numbers had found, each from where it came to rest; what decides which sets are tried, or
 what is looked for in the recordings first, is searched anew, no set of a sample weighed twice (remembered.py); what a
-judge alone reads is judged anew. Stopped, it goes on where it was (runs/matters/).
+judge alone reads is judged anew. Stopped, it goes on where it was (runs/matters/), by the same code.
 
 python fits/real-panel/matters.py list                        all numbers, and which way each is asked
 python fits/real-panel/matters.py found                       search with the usual numbers (once; 6 minutes of a core)
@@ -127,15 +127,21 @@ def weighed(entry: panel_samples.Entry, path: str, at: Numbers, found: Found) ->
     return rejudge.verdict_of(judge(evidence, at.criteria), at.criteria)
 
 
+def known(path: Path) -> dict | None:
+    """What was answered before by this very code; None where it was not."""
+    said = json.loads(path.read_text()) if path.exists() else {}
+    return said if said.get("code") == LOADED else None
+
+
 def answer(entry: panel_samples.Entry, path: str, factor: float, sets: Remembered) -> None:
     """Ask one sample, unless it was asked before; `sets` that were weighed for it."""
     kept = file_of(RUNS, entry.id, name_of(path, factor).replace(" ", "-"))
-    if kept.exists():
+    if known(kept) is not None:
         return
     base = file_of(RUNS, entry.id, "found")
-    if not base.exists():
+    if known(base) is None:
         verdict, found = searched(entry, Numbers(), sets)
-        write_json(base, {"searched": verdict, "found": found.as_dict()})
+        write_json(base, {"searched": verdict, "found": found.as_dict(), "code": LOADED})
     if path == "found":
         return
     begun, stored = time.perf_counter(), json.loads(base.read_text())
@@ -151,18 +157,17 @@ def answer(entry: panel_samples.Entry, path: str, factor: float, sets: Remembere
             said = {"weighed": weighed(entry, path, Numbers().changed(path, factor), Found.read(stored["found"]))}
     except Exception as error:  # a number may make a sample impossible: that is an answer too
         said = {"failed": f"{type(error).__name__}: {error}"}
-    write_json(kept, said | {"seconds": time.perf_counter() - begun})
+    write_json(kept, said | {"seconds": time.perf_counter() - begun, "code": LOADED})
 
 
 def marked(path: str, factor: float, way: str) -> list[Answer]:
     """The answers of all samples, graded."""
     causes, words = read_causes(HERE / "causes.toml")
-    known, out = {c.id: c for c in causes}, []
+    of, out = {c.id: c for c in causes}, []
     for entry in samples():
         kept = file_of(RUNS, entry.id, name_of(path, factor).replace(" ", "-"))
-        if kept.exists():
-            said = json.loads(kept.read_text())
-            out.append(answered(known[entry.id], said.get(way, {"verdict": "failed", "effects": []}), words))
+        if (said := known(kept)) is not None:
+            out.append(answered(of[entry.id], said.get(way, {"verdict": "failed", "effects": []}), words))
     return out
 
 

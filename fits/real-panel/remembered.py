@@ -30,7 +30,7 @@ class Remembered(Kept):
         bench = scales.bench
         told = described(
             [
-                (sorted(bench.candidates), bench.free, bench.start, bench.known, bench.sigma, bench.y),
+                (bench.candidates, bench.free, bench.start, bench.known, bench.sigma, bench.y),
                 (scales.cut, scales.blocked, scales.discrepancy, scales.families, scales.moments),
                 (scales.values, scales.reference, scales.peak),
                 (tuple(keys), dict(start.values), start.v, None if start.at is None else dict(start.at), course),

@@ -9,7 +9,6 @@ MATTERS_EVERY and MATTERS_PART as for matters.py. Stopped, it goes on where it w
 
 import csv
 import io
-import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
@@ -58,8 +57,8 @@ def table() -> str:
     stored: dict[str, dict[str, dict]] = {}
     for folder in sorted(p for p in RUNS.iterdir() if p.is_dir()):
         for path in sorted(folder.glob("*.json")):
-            found = json.loads(path.read_text())
-            stored.setdefault(found["question"], {})[path.stem] = found["said"]
+            if (found := matters.known(path)) is not None:
+                stored.setdefault(found["question"], {})[path.stem] = found["said"]
     text = io.StringIO()
     lines = csv.writer(text, lineterminator="\n")
     lines.writerow(["numbers", "samples", "answers that change", "largest change of a probability", "which", "code"])
@@ -90,9 +89,9 @@ def main(given: Sequence[str]) -> str:
             sets = Remembered()
             for question, at in asked.items():
                 kept = file_of(RUNS, entry.id, question.replace(" ", "-"))
-                if not kept.exists():
+                if matters.known(kept) is None:
                     said, _ = matters.searched(entry, at, sets)
-                    write_json(kept, {"question": question, "said": said})
+                    write_json(kept, {"question": question, "said": said, "code": LOADED})
                 stage.advance(note=f"{question}: {entry.id}")
     return table() if parts == 1 else "kept in runs/without"
 
