@@ -17,6 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import tissuejax as tj
 from tissuejax.challenge.panel import answered, read_causes, summary
@@ -24,7 +25,8 @@ from tissuejax.errors import InputError
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.recording import Channel, Recording, Sample
 from tissuejax.recordings.specimens import NO_TIME
-from tissuejax.storage import write_between, write_json
+from tissuejax.report.plot import INK, PAPER, tidy
+from tissuejax.storage import write_between, write_figure, write_json
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "real-panel"))
@@ -165,6 +167,27 @@ def table(answers: list) -> str:
     return "\n".join(lines)
 
 
+def drawn(listed: list[Entry], answers: list) -> Figure:
+    """Every sample as it was recorded: stress over time where something is held, over stretch elsewhere."""
+    figure = Figure(figsize=(11, 11), layout="constrained", facecolor=PAPER)
+    axes = figure.subplots(4, 3).ravel()
+    for ax, entry, answer in zip(axes, listed, answers):
+        tidy(ax)
+        held = entry.key in ("vhb-relaxation", "silicone-hold", "muscle-hold")
+        for name, r in build(entry)[0].recordings.items():
+            c = r.channels["nominal_stress"]
+            x, y = np.asarray(r.inputs["time" if held else "stretch"]), 1e-3 * np.asarray(c.values)
+            ax.plot(x, y, ".-", ms=3, lw=0.8, label=name)
+        ax.set_title(f"{entry.id}: {' + '.join(answer.named)}", fontsize=8, color=INK)
+        ax.set_xlabel("time, s" if held else "stretch, 1", fontsize=8)
+        ax.set_ylabel("nominal stress, kPa", fontsize=8)
+        if held:
+            ax.set_xscale("symlog", linthresh=1.0)
+    for ax in axes[len(listed) :]:
+        ax.set_visible(False)
+    return figure
+
+
 def main(where: Path) -> str:
     """Diagnose what has no result yet, grade; returns the answer in a sentence."""
     causes, words = read_causes(where / "causes.toml")
@@ -180,6 +203,8 @@ def main(where: Path) -> str:
     found = {"listed": len(causes), "answered": len(answers), **summary(answers)}
     write_json(where / "result.json", found)
     write_between(where / "README.md", BEGIN, END, table(answers))
+    if "TISSUEJAX_UNSEEN" in os.environ:
+        write_figure(where / "samples.png", drawn(listed, answers), dpi=90)
     right = found["rates"]["cause named and no wrong name"]
     return f"{len(answers)} samples; cause named without a wrong name in {right['share']:.0%} of {right['of']}"
 
