@@ -273,7 +273,7 @@ def test_the_first_and_the_next_power_of_a_normal_likelihood(shift):
     assert _next(shift - 0.5 * (norm.ppf(share) / math.sqrt(0.14)) ** 2, 0.14) == 1.0
 
 
-def test_half_of_the_particles_is_enough_and_a_hundred_that_are_one_move_all_the_same():
+def test_half_of_the_particles_is_enough_and_where_one_of_three_counts_the_power_still_rises():
     assert _next(np.array([0.0, -1e9]), 0.3) == 1.0  # one of two
     assert _next(np.array([0.0, 0.0, -1e9]), 0.3) == 1.0
     step = _next(np.array([0.0, -1e40, -1e40]), 0.25) - 0.25  # one of three: the last of fifty halvings is taken

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from straight_bench import DRIVE, TIME, N, straight
 
-from tissuejax.diagnosis.judgement.blocks import State, blocks, driven_states, series
+from tissuejax.diagnosis.judgement.blocks import State, blocks, driven_states, path, series, strain
 from tissuejax.diagnosis.judgement.particular import Means
 from tissuejax.estimation.series import Segment
 
@@ -73,3 +73,14 @@ def test_without_samples_to_spare_a_block_is_one_sample_whatever_the_way():
     bench = made()
     bench.segments = [replace(s, drive=np.where(np.arange(N) < 15, 1.0, 2.0)) for s in bench.segments]
     assert blocks(bench, {"force": N}).counts.tolist() == [1] * (4 * N)
+
+
+def test_a_way_may_be_all_in_its_last_step():
+    np.testing.assert_array_equal(path(np.array([2.0, 2.0, 5.0])), [0.0, 0.0, 1.0])
+    np.testing.assert_array_equal(path(np.array([2.0, 5.0, 5.0])), [0.0, 1.0, 1.0])
+
+
+@pytest.mark.parametrize("name", ["shear", "twist", "depth"])
+def test_what_is_no_stretch_is_a_strain_as_it_is(name):
+    segment = replace(made().segments[0], drive_name=name)
+    np.testing.assert_array_equal(strain(segment), segment.drive)

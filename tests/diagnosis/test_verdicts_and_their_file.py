@@ -107,6 +107,22 @@ def test_ten_alternatives_are_kept_the_likeliest_first():
     assert [s.names for s, _ in j.alternatives] == [(n,) for n in names[11:1:-1]]
 
 
+def test_a_name_is_given_where_it_is_likelier_than_the_rule_says_and_not_where_it_is_as_likely():
+    given = evidence(weighed([], 0.0), weighed(["slack"], 1.5), weighed(["drift"], 1.0))
+    likely = judge(given).inclusion["slack"]
+    assert judge(given, Criteria(named=likely)).exact == 0.0
+    assert judge(given, Criteria(named=likely * (1 - 1e-12))).exact > 0.0
+
+
+def test_what_is_stated_may_be_a_set_that_was_never_weighed():
+    """Of all three pairs of three names each name is in two: all are likelier present than not, together never."""
+    sets = [weighed([], -50.0), *(weighed(pair, 0.0) for pair in combinations(("a", "b", "c"), 2))]
+    j = judge(Evidence(tuple(sets), dict.fromkeys("abc", 1), ("p",), ()))
+    assert j.inclusion == pytest.approx(dict.fromkeys("abc", 2 / 3))
+    assert (j.exact, j.probabilities[Kind.FOUND]) == (0.0, 0.0)
+    assert j.probabilities[Kind.AMBIGUOUS] == pytest.approx(1.0)
+
+
 @pytest.mark.parametrize(("base", "drift"), [("void", 2.0), ("impossible", 2.0), ("none", -9.0)])
 def test_where_the_base_cannot_be_nothing_is_never_the_answer(base, drift):
     """Of one name in one form and one in three: e^1 and e^2 / 3."""

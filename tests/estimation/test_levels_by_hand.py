@@ -23,6 +23,11 @@ def test_third_differences_of_polynomials_by_hand():
     assert rough(np.where(T == 40, 1.0, 0.0)) == 0.0, "one sample that is out does not move a median"
 
 
+@pytest.mark.parametrize("n", range(4))
+def test_fewer_than_four_samples_have_no_third_difference(n):
+    assert rough(np.full(n, 5.0)) == 0.0
+
+
 @pytest.mark.parametrize(("values", "repeats", "step"), [
     ([0.0, 1.0], 4, 1.0),
     ([0.0, 0.5, 2.0], 4, 0.5),

@@ -98,7 +98,8 @@ def estimate(
     surfaces = [_Surface(series[i], recorded, mismatch) for i in long]
     shared = _best(surfaces, orders)
     price = 2 * (len(surfaces) - 1) * math.log(sum(s.n for s in surfaces))
-    common = 2 * shared.apart < 0.5 * price  # on a coarse grid; the rest is seen where it may matter
+    # on a coarse grid; the rest is seen where it may matter
+    common = len(surfaces) == 1 or 2 * shared.apart < 0.5 * price
     alone = [_best([s], orders) for s in surfaces] if not common else [shared] * len(surfaces)
     common = common or 2 * (sum(a.likelihood for a in alone) - shared.likelihood) <= price
     noises = [shared.noise(_step(np.asarray(s.time, float))) for s in series]

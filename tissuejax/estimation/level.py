@@ -70,9 +70,12 @@ class Level:
 
 
 def rough(y: Float[np.ndarray, " n"]) -> float:
-    """Standard deviation of white noise on a smooth series: from third differences, by their median."""
+    """Standard deviation of white noise on a smooth series: from third differences, by their median; 0 where a series
+    is too short to have one."""
+    if len(y) < len(THIRD):
+        return 0.0
     d = np.convolve(y, THIRD, "valid") / np.sqrt(np.sum(THIRD**2))
-    return float(np.median(np.abs(d)) / 0.6745) if len(d) else 0.0
+    return float(np.median(np.abs(d)) / 0.6745)
 
 
 def resolution(y: Float[np.ndarray, " n"]) -> float:

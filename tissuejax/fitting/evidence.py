@@ -64,7 +64,9 @@ def evidence(target: Target, particles: int = 500, runs: int = 4, seed: int = 0)
     constant = -float(np.sum(np.log(sigma))) - 0.5 * len(sigma) * math.log(2 * math.pi)
 
     def likelihood(x):
-        return target.likelihoods(x, target.data)
+        """Nothing is likely where a law has no stress."""
+        told = np.asarray(target.likelihoods(x, target.data))
+        return np.where(np.isnan(told), -np.inf, told)
 
     def prior(x):
         """ln of the normal priors, unnormalised; they are part of log_likelihood and taken out there."""

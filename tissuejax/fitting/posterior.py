@@ -89,6 +89,7 @@ def laplace(target: Target, x: Float[np.ndarray, " p"], draws: int = 2000, seed:
     z = rng.normal(size=(draws, len(centre)))
     y = centre + z @ root.T
     log_p = np.asarray(target.many(y, target.data))
+    log_p = np.where(np.isnan(log_p), -np.inf, log_p)  # where a law has no stress nothing is likely
     log_w, khat = az.psislw(log_p + 0.5 * np.sum(z**2, axis=1))
     weights = np.exp(np.asarray(log_w) - np.max(log_w))
     weights = np.where(np.isfinite(weights), weights, 0.0)
