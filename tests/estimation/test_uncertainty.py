@@ -73,6 +73,12 @@ def test_standard_errors_are_the_roots_of_the_inverse_and_none_where_two_columns
         assert np.isfinite(standard_errors(twins)).all() == seen
 
 
+def test_standard_errors_are_no_numbers_where_nothing_depends_on_a_parameter():
+    slopes = np.array([[1.0, 0.0], [2.0, 0.0], [0.0, 0.0]])
+    np.testing.assert_array_equal(standard_errors(slopes), [np.nan, np.nan])
+    np.testing.assert_array_equal(standard_errors(np.zeros((3, 2))), [np.nan, np.nan])
+
+
 def test_variances_are_multiplied_by_what_correlation_and_level_make_of_them(rng):
     jacobian = rng.normal(size=(30, 2))
     noise = 0.6 ** np.abs(np.subtract.outer(np.arange(30), np.arange(30)))

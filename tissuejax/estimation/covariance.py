@@ -61,6 +61,8 @@ def standard_errors(jacobian: Float[np.ndarray, "n p"], weakest: float = 1e-8) -
         weakest: smallest singular value over the largest, columns of unit length, that counts as seen.
     """
     norms = np.linalg.norm(jacobian, axis=0)
+    if not np.all(norms > 0):  # a parameter that nothing depends on
+        return np.full(len(norms), np.nan)
     found = Directions.of(jacobian, 1 / norms)
     if not found.s[-1] > weakest * found.s[0]:
         return np.full(len(norms), np.nan)
@@ -180,7 +182,7 @@ def unseen(
     if len(who) == 1:
         return f"{labels[who[0]]} is not identified by these recordings: it {how}."
     if len(who) == 2:
-        i, j = sorted(who)
+        i, j = sorted(map(int, who))
         return (
             f"Only {seen_pair(direction, size, labels, units, i, j)} is seen: a change of one against the other {how}."
         )

@@ -331,9 +331,9 @@ def _described(scales: Scales, keys: Sequence[str], best: Round, criteria: Crite
 
 
 def kurtosis(x: Float[np.ndarray, " n"]) -> float:
-    """Fourth moment over the square of the second, less that of a normal distribution."""
+    """Fourth moment over the square of the second, less that of a normal distribution; 0 of what doesn't vary."""
     square = (x - np.mean(x)) ** 2
-    return float(np.mean(square**2) / np.mean(square) ** 2) - 3.0
+    return float(np.mean(square**2) / np.mean(square) ** 2) - 3.0 if np.any(square) else 0.0
 
 
 def _resting(c: Candidate, fit: Refit, bench: Bench, at_bound: Sequence[str], v: np.ndarray, families) -> bool:
