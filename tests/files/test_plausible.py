@@ -8,7 +8,7 @@ import pytest
 
 from tissuejax.errors import InputError
 from tissuejax.recordings.plausible import refuse_gaps, refuse_unusable, slips
-from tissuejax.recordings.recording import Channel, Recording, Sample
+from tissuejax.recordings.recording import NO_TIME, Channel, Recording, Sample
 
 N = 200
 
@@ -79,6 +79,28 @@ def test_noise_behind_a_filter_of_any_usual_width_is_seen(width):
     noise = gaussian_filter1d(np.random.default_rng(7).normal(0, 25, 400), width)
     stress = 4000 * (stretch - stretch**-2) + noise
     assert "smoothed or filtered" in said(stretch=stretch, stress=stress, time=np.linspace(0, 20, 400), noise=None)
+
+
+def test_a_recording_cut_out_of_a_longer_one_is_told_that_its_history_is_missing():
+    late = recording(stretch=np.linspace(1.1, 1.3, N))
+    words = "r: starts at stretch 1.1, not at rest (1): what was done before the recording no model knows of"
+    assert any(said.startswith(words) for said in slips(sample(r=late)))
+    pressed, sheared = recording(stretch=np.linspace(0.93, 0.5, N)), recording()
+    assert "starts at stretch 0.93, not" in " ".join(slips(sample(r=pressed)))
+    sheared = replace(sheared, inputs={"time": sheared.inputs["time"], "shear": np.linspace(-0.2, 0.5, N)})
+    assert "starts at shear -0.2, not at rest (0)" in " ".join(slips(sample(r=sheared)))
+    both = replace(late, inputs={"stretch": np.column_stack([np.linspace(1, 1.3, N), np.linspace(1.04, 1.2, N)])})
+    assert "starts at stretch 1.04, not" in " ".join(slips(sample(r=both)))  # the axis that is further from rest
+
+
+@pytest.mark.parametrize(("first", "last"), [(1.0, 1.3), (1.014, 1.3), (0.988, 0.75), (1.0009, 1.01)])
+def test_a_first_reading_near_rest_is_no_missing_history(first, last):
+    assert "not at rest" not in said(stretch=np.linspace(first, last, N))
+
+
+def test_rows_without_times_have_no_history_that_could_be_missing():
+    rows = Sample("s", {"r": recording(stretch=np.linspace(1.1, 1.3, N))}, notes=NO_TIME)
+    assert "not at rest" not in " ".join(slips(rows))
 
 
 def test_where_the_noise_was_recorded_a_filter_asks_for_nothing():

@@ -31,7 +31,7 @@ def slips(sample: Sample, names: Iterable[str] | None = None) -> list[str]:
     said = []
     for name in sample.recordings if names is None else names:
         recording = sample.recordings[name]
-        for check in CHECKS:
+        for check in (*CHECKS, *(TIMED if sample.timed else ())):
             said += [f"{name}: {sentence}" for sentence in check(recording)]
     return said
 
@@ -165,7 +165,7 @@ def _history(recording: Recording) -> list[str]:
     drive = drive_of(recording)
     if load is None or len(load) < FEW or not np.ptp(load):
         return []
-    if drive is None or abs(drive[0]) > 0.05 * np.abs(drive).max():  # said already: not at rest
+    if drive is None or abs(drive[0]) > 0.05 * np.abs(drive).max():  # `_strained` says so
         return []
     noise = recording.channels["nominal_stress"].noise_std or 0.0
     share = abs(load[0]) / np.abs(load).max()
@@ -174,6 +174,20 @@ def _history(recording: Recording) -> list[str]:
             f"starts at {share:.0%} of its largest stress, not at zero: a preload, an offset of the cell, or loading "
             "before the recording that the model doesn't know of"
         ]
+    return []
+
+
+def _strained(recording: Recording) -> list[str]:
+    for key, rest in (("stretch", 1.0), ("shear", 0.0)):
+        if key in recording.inputs:
+            drive = np.atleast_2d(np.asarray(recording.inputs[key], float).T) - rest  # an axis each
+            first, most = np.abs(drive[:, 0]), np.abs(drive).max(axis=1)
+            axis = int(np.argmax(first))
+            if first[axis] > max(0.05 * most[axis], 1e-3):
+                return [
+                    f"starts at {key} {drive[axis, 0] + rest:.3g}, not at rest ({rest:g}): what was done before the "
+                    "recording no model knows of; relaxation begins at the first sample, as if that were done then"
+                ]
     return []
 
 
@@ -190,3 +204,4 @@ CHECKS = (
     signals.filtered,
     _history,
 )
+TIMED = (_strained,)  # what means nothing where no times were recorded

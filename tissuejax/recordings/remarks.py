@@ -26,9 +26,6 @@ def remarks(sample: Sample) -> list[str]:
                 said.append(f"{name}: {share:.1%} of {key} is missing (NaN), in {lost:.0%} of the samples.")
             if not channel.noise_std:
                 said.append(f"{name}: no noise level for {key}: a fit has to estimate it.")
-        stretch = recording.inputs.get("stretch")
-        if stretch is not None and abs(float(np.asarray(stretch)[0].max()) - 1.0) > 0.02:
-            said.append(f"{name}: starts at stretch {np.asarray(stretch)[0]}, not at rest (1).")
     return said + slips(sample)
 
 
