@@ -91,6 +91,8 @@ def test_a_recording_cut_out_of_a_longer_one_is_told_that_its_history_is_missing
     assert "starts at shear -0.2, not at rest (0)" in " ".join(slips(sample(r=sheared)))
     both = replace(late, inputs={"stretch": np.column_stack([np.linspace(1, 1.3, N), np.linspace(1.04, 1.2, N)])})
     assert "starts at stretch 1.04, not" in " ".join(slips(sample(r=both)))  # the axis that is further from rest
+    both = replace(late, inputs={"stretch": np.column_stack([np.linspace(1.04, 2, N), np.linspace(1.02, 1.1, N)])})
+    assert "starts at stretch 1.02, not" in " ".join(slips(sample(r=both)))  # each by how far it is driven
 
 
 @pytest.mark.parametrize(("first", "last"), [(1.0, 1.3), (1.014, 1.3), (0.988, 0.75), (1.0009, 1.01)])

@@ -12,7 +12,7 @@ import numpy as np
 from tissuejax.errors import InputError
 from tissuejax.recordings import checks
 from tissuejax.recordings import plausible_signals as signals
-from tissuejax.recordings.plausible_signals import drive_of, load_of, unanswered
+from tissuejax.recordings.plausible_signals import deformation_of, drive_of, load_of, unanswered
 from tissuejax.recordings.recording import Recording, Sample
 
 STRETCH = (0.2, 4.0)  # what soft tissue bears
@@ -178,17 +178,18 @@ def _history(recording: Recording) -> list[str]:
 
 
 def _strained(recording: Recording) -> list[str]:
-    for key, rest in (("stretch", 1.0), ("shear", 0.0)):
-        if key in recording.inputs:
-            drive = np.atleast_2d(np.asarray(recording.inputs[key], float).T) - rest  # an axis each
-            first, most = np.abs(drive[:, 0]), np.abs(drive).max(axis=1)
-            axis = int(np.argmax(first))
-            if first[axis] > max(0.05 * most[axis], 1e-3):
-                return [
-                    f"starts at {key} {drive[axis, 0] + rest:.3g}, not at rest ({rest:g}): what was done before the "
-                    "recording no model knows of; relaxation begins at the first sample, as if that were done then"
-                ]
-    return []
+    if (driven := deformation_of(recording)) is None:
+        return []
+    key, rest, values = driven
+    strain = np.abs(values - rest)
+    beyond = strain[0] - np.maximum(0.05 * strain.max(axis=0), 1e-3)
+    if np.max(beyond) <= 0:
+        return []
+    first = values[0, int(np.argmax(beyond))]
+    return [
+        f"starts at {key} {first:.3g}, not at rest ({rest:g}): what was done before the recording no model knows of; "
+        "relaxation begins at the first sample, as if that were done then"
+    ]
 
 
 CHECKS = (

@@ -21,13 +21,21 @@ COARSE = 0.01  # of the range: a step of the sensor that matters
 SPIKE, BESIDE = 0.2, 0.05  # of the range: a sample beyond both its neighbours, which are that near each other
 
 
-def drive_of(recording: Recording) -> Float[np.ndarray, " n"] | None:
-    """Stretch minus one, or shear, of a material test (the first axis of two); None for others."""
+def deformation_of(recording: Recording) -> tuple[str, float, Float[np.ndarray, "n axes"]] | None:
+    """What a material test was driven by, its value at rest, and its values by axis; None for others."""
     for key, rest in (("stretch", 1.0), ("shear", 0.0)):
         if key in recording.inputs:
             values = np.asarray(recording.inputs[key], float)
-            return values.reshape(len(values), -1)[:, 0] - rest
+            return key, rest, values.reshape(len(values), -1)
     return None
+
+
+def drive_of(recording: Recording) -> Float[np.ndarray, " n"] | None:
+    """Stretch minus one, or shear, of a material test (the first axis of two); None for others."""
+    if (driven := deformation_of(recording)) is None:
+        return None
+    _, rest, values = driven
+    return values[:, 0] - rest
 
 
 def load_of(recording: Recording) -> Float[np.ndarray, " n"] | None:
