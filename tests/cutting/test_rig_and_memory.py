@@ -99,7 +99,7 @@ def test_a_soft_rig_leaves_no_work_unaccounted(slice_, compliance):
     assert float(p.run(KNOWN | {COMPLIANCE: compliance})["r"].imbalance) < 0.005
 
 
-@pytest.mark.parametrize("friction", [None, 0.1])
+@pytest.mark.parametrize("friction", [pytest.param(None, marks=pytest.mark.slow), 0.1])
 def test_what_a_rig_puts_in_and_the_blade_does_not_give_is_in_its_spring(friction):
     """Work at the driven end less work of the tip is C F^2 / 2, and what the rig's answer takes by lagging: it follows
     the force by a step of the run, like a dashpot. The tip stands C F behind."""

@@ -116,6 +116,7 @@ def test_sensors_are_blind_to_each_other(bench):
         assert np.any(change)
 
 
+@pytest.mark.slow
 def test_a_probe_that_is_too_low_is_found_again(bench):
     found = refit(bench, white(bench), ("contact-offset/depth",), {}, iterations=8, tolerance=2.0)
     depth, std = found.values["effects.contact-offset.depth"], found.std["effects.contact-offset.depth"]

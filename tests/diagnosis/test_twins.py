@@ -51,6 +51,7 @@ def relaxing():
     return Sample("s", {"hold": r})
 
 
+@pytest.mark.slow
 def test_a_diagnosis_shows_one_time():
     found = diagnose(relaxing(), "neo-hookean", effects=("viscoelasticity",)).answered
     # richer forms were weighed, one of them was a nat likelier, and their further shares have no error worth the name

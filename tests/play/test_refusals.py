@@ -68,6 +68,7 @@ def test_what_precompute_refuses(argv, words, capsys, tmp_path):
     assert not list(tmp_path.glob("*.h5"))
 
 
+@pytest.mark.slow
 def test_an_error_is_not_called_reached_where_no_force_can_be_felt(capsys, tmp_path):
     """0.6 mm deep there is no force over 0.05 N, so that no error can be told of it: without `--error` that is said."""
     small = [*SMALL, "--processes", "1", "--out", tmp_path / "a.play.h5"]
