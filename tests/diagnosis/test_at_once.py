@@ -182,10 +182,10 @@ def relaxing(name, time, stretch, law):
 def test_a_tear_is_found_though_a_gain_that_wanes_had_taken_it_up():
     asked = asked_of(recorded(tearing), "neo-hookean")
     cut, of = asked.left()
-    criteria, effort = asked.question.criteria, Effort()
-    scales, base = based(asked.whole, cut, of, criteria, effort, Kept())
+    criteria = asked.question.criteria
+    scales, base = based(asked.whole, cut, of, criteria, Kept())
     assert base.evidence.amplitudes["waning gain"] > 0.1
-    scales, disturbed = disrupted(scales, base, criteria, effort.course)
+    scales, disturbed = disrupted(scales, base, criteria)
     (moment,) = [m for m in scales.discrepancy.sudden if held(disturbed, m)]
     assert (moment.recording, moment.time) == (0, pytest.approx(10.0, abs=0.4))
     assert disturbed.evidence.amplitudes["waning gain"] < 0.01

@@ -38,7 +38,7 @@ def test_damage_on_the_virgin_path_is_tried_though_damage_behind_it_says_nothing
     asked = asked_of(pulled(), "neo-hookean", effects=("softening", "viscoelasticity"))
     cut, of = asked.left()
     criteria, effort = Criteria(), Effort()
-    scales, base = based(asked.whole, cut, of, criteria, effort, Kept())
+    scales, base = based(asked.whole, cut, of, criteria, Kept())
     found = alone(scales.bench, scales, base, Setup(criteria, effort))
     assert found.best == {"softening/with loading"}
     relaxing = [k for k in found.weighed if found.names(k) == {"viscoelasticity"}]

@@ -135,7 +135,7 @@ def test_a_set_that_is_resumed_stays_where_it_was():
         recordings[f"s{k}"] = Recording(f"s{k}", "uniaxial", {"time": time, "stretch": stretch}, channels)
     asked = asked_of(Sample("relaxing", recordings), "reduced-polynomial-2", effects=["viscoelasticity"])
     cut, of = asked.left()
-    scales, base = based(asked.whole, cut, of, Criteria(), Effort(), Kept())
+    scales, base = based(asked.whole, cut, of, Criteria(), Kept())
     rooted(scales, base, asked.whole.free)
     key = "viscoelasticity/one time"
     start = {**base.refit.values, **scales.bench.candidates[key].grid[0]}

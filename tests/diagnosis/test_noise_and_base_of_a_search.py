@@ -41,7 +41,7 @@ def test_the_base_is_weighed_again_where_its_residual_shows_coloured_noise(monke
     monkeypatch.setattr(search, "coloured", lambda *given: seen.append(given) or noise)
     kept = Told(-50.0, -40.0)
     cut = blocks(bench, {"force": MEANS})
-    scales, base = search.based(bench, cut, Given(GAIN), Criteria(), Effort(course=course), kept, start)
+    scales, base = search.based(bench, cut, Given(GAIN), Criteria(), kept, start, course)
     (keys, first, how, white), *more = kept.asked
     assert (keys, first, how) == ((), start or Start(START), course)
     assert scales.values == first.values
@@ -61,7 +61,7 @@ def test_the_base_is_weighed_again_where_its_residual_shows_coloured_noise(monke
 def test_a_base_that_cannot_be_predicted_is_an_error_that_names_the_recordings(worth):
     bench = straight({})
     with pytest.raises(NotConverged, match="can't be fitted to p, q: its prediction is not finite"):
-        search.based(bench, blocks(bench), Given(GAIN), Criteria(), Effort(), Told(worth))
+        search.based(bench, blocks(bench), Given(GAIN), Criteria(), Told(worth))
 
 
 def test_sizes_are_taken_at_the_base_s_fit_and_without_priors():
@@ -152,16 +152,15 @@ def test_a_search_is_made_anew_as_often_as_noise_is_read_again(monkeypatch, read
     monkeypatch.setattr(search, "searched", searched)
     monkeypatch.setattr(search, "noise_beside", lambda e: next(read, None))
     reports, kept = [], Told(*[-50.0 - i for i in range(5)])
-    course = Course(rounds=9)
     first = weighed((), -1.0, a=3.0, b=4.0)
     monkeypatch.setattr(search, "based", lambda *given: told.append(given) or (scales, first))
-    by = Setup(effort=Effort(readings=readings, course=course), report=reports.append, kept=kept)
+    by = Setup(effort=Effort(readings=readings, course=Course(rounds=9)), report=reports.append, kept=kept)
     e = search.explore("bench", "cut", "of", by)
-    assert told == [("bench", "cut", "of", by.criteria, by.effort, kept)]
+    assert told == [("bench", "cut", "of", by.criteria, kept)]
     assert reports == ["fitting the base model"]
     assert looked == [e]
     starts = [{"a": 3.0, "b": 4.0}, *[{"a": 10.0, "b": 20.0}] * 3]
-    again = [((), Start(starts[i]), course, f"noise {i}") for i in range(searches - 1)]
+    again = [((), Start(starts[i]), Course(), f"noise {i}") for i in range(searches - 1)]
     assert kept.asked == again
     assert e.noise_of is (best if searches > 1 else None)
     assert e.blocked == (f"noise {searches - 2}" if searches > 1 else scales.blocked)

@@ -6,7 +6,7 @@ import pytest
 from tissuejax.diagnosis.diagnose import asked_of
 from tissuejax.diagnosis.judgement.blocks import blocks
 from tissuejax.diagnosis.judgement.criteria import Criteria
-from tissuejax.diagnosis.judgement.effort import Course, Effort
+from tissuejax.diagnosis.judgement.effort import Course
 from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.search import based, rooted
 from tissuejax.diagnosis.judgement.weigh import Start, weigh
@@ -117,7 +117,7 @@ def test_evidence_is_that_of_all_samples():
     whole, thin, cut, of = benches(specimen(relaxing=True), ["viscoelasticity", "drift"])
     found = {}
     for name, bench in (("whole", whole), ("thin", thin)):
-        scales, base = based(bench, cut, of, Criteria(), Effort(), Kept())
+        scales, base = based(bench, cut, of, Criteria(), Kept())
         rooted(scales, base, whole.free)
         for key in ("viscoelasticity/one time", "drift/offset"):
             start = {**base.refit.values, **scales.bench.candidates[key].grid[0]}

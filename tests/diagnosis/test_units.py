@@ -56,12 +56,13 @@ def weighed(stiffer: float) -> dict[frozenset[str], SetEvidence]:
     asked = asked_of(pulled(stiffer), LAW, effects=EFFECTS)
     cut, of = asked.left()
     criteria, effort = Criteria(), Effort(most=1, given_up=math.inf)
-    scales, base = based(asked.whole, cut, of, criteria, effort, Kept())
+    scales, base = based(asked.whole, cut, of, criteria, Kept())
     found = alone(scales.bench, scales, base, Setup(criteria, effort))
     found.reshape(frozenset({"softening"}))
     return {key: w.evidence for key, w in found.weighed.items()}
 
 
+@pytest.mark.slow
 def test_a_stiffer_specimen_has_the_same_evidence():
     soft, stiff = weighed(1.0), weighed(STIFFER)
     none = frozenset()  # its moduli have flat priors, a density per pascal

@@ -139,7 +139,7 @@ def test_all_numbers_are_reached_from_one_place_and_each_can_be_changed():
         other = Numbers().changed(path, 2.0).all()
         assert {p for p in known if other[p] != known[p]} <= {path}
     assert Numbers().changed("criteria.smooth.turning", 2.0).criteria.smooth.turning == 0.8
-    assert Numbers().changed("effort.rounds", 0.5).effort.rounds == 2
+    assert Numbers().changed("effort.course.rounds", 0.5).effort.course.rounds == 2
     with pytest.raises(tissuejax.errors.InputError, match="criteria.shares.law"):
         Numbers().changed("criteria.shares.lw", 2.0)
 

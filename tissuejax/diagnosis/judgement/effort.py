@@ -47,7 +47,6 @@ class Effort:
         spend: cost of a search's predictions (of the plain base model each) after which nothing new is begun.
             Ground: cost, a quarter of an hour at most; the costliest three of 64 sealed cases spend a quarter of it.
         nested: searches and memories nested in a prediction at most. Ground: cost, which each multiplies.
-        rounds, iterations: of fit and amplitudes in turn, and of a fit, where a set is weighed. Ground: cost.
         trial: iterations of a fit that only compares starts. Ground: cost.
         least: nats that the linear step of a single effect has to promise. Ground: less than its share of the prior
             can bring back; negative, for a step is short where a gap or a frequency leads far.
@@ -64,7 +63,8 @@ class Effort:
         stepwise: a second effect is sought only where a first one has come in.
         shown: steps of a fit that is shown. Ground: fits end by themselves before.
         rivals: alternatives that get a fit of their own. Ground: a page shows no more.
-        course: how far the base's fit is followed, and every set's where nothing else is said here.
+        course: how far the fit of a set of effects is followed; that of the base as a `Course` is by default, for all
+            sets are held against it.
     """
 
     most: int = 3
@@ -79,8 +79,6 @@ class Effort:
     short: int = 4
     spend: float = 1e6
     nested: int = 2
-    rounds: int = 4
-    iterations: int = 12
     trial: int = 5
     least: float = -4.0
     hopeful: float = 8.0

@@ -146,7 +146,7 @@ class Exploration:
             return None
         self.tell("weighing", order)
         floor = self.weighed[self.best].evidence.log_evidence - effort.given_up
-        course = replace(self._course, floor=floor, anchor=not self.bench.costly)
+        course = replace(self.effort.course, floor=floor, anchor=not self.bench.costly)
         begin = [Start(s, v, bench) for s in starts]
         found = self._descended(order, begin, course)
         if (inside := self._inside(order, found)) is not None:
@@ -195,10 +195,6 @@ class Exploration:
         there = inside.evidence.log_evidence
         astray = found.evidence.log_evidence < there - self.effort.hopeful
         return inside if astray and there > sets[self.best].evidence.log_evidence - self.effort.given_up else None
-
-    @property
-    def _course(self) -> Course:
-        return replace(self.effort.course, rounds=self.effort.rounds, iterations=self.effort.iterations)
 
     def score(self, key: frozenset) -> list[Score]:
         """Every candidate that may join the set, by the log evidence that its linear step gains, best first."""
@@ -316,7 +312,8 @@ class Exploration:
             self.weighed[left[0]] = again
 
     def _settled(self, w: Weighed, values: Mapping[str, float], v: Float[np.ndarray, " K"] | None = None) -> Weighed:
-        return self.kept.weigh(self.scales, w.evidence.keys, Start(values, v, w.bench), self.criteria, self._course)
+        start = Start(values, v, w.bench)
+        return self.kept.weigh(self.scales, w.evidence.keys, start, self.criteria, self.effort.course)
 
     def look_again(self) -> None:
         """Weigh the best sets and the base anew beside what may have happened at once by the best of them."""

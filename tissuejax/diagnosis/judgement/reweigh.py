@@ -7,7 +7,7 @@ derivative. That says what a number does to the weight of sets; what else a sear
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from tissuejax.diagnosis.bench import Bench
 from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.judgement.coloured import shown
 from tissuejax.diagnosis.judgement.criteria import Criteria
-from tissuejax.diagnosis.judgement.effort import Effort
+from tissuejax.diagnosis.judgement.effort import Course
 from tissuejax.diagnosis.judgement.evidence import Evidence
 from tissuejax.diagnosis.judgement.explore import Exploration
 from tissuejax.diagnosis.judgement.judge import left
@@ -106,25 +106,24 @@ class Found:
 
 
 def reweighed(
-    bench: Bench, cut: Blocks, of: Discrepancy, found: Found, criteria: Criteria, effort: Effort | None = None
+    bench: Bench, cut: Blocks, of: Discrepancy, found: Found, criteria: Criteria, course: Course | None = None
 ) -> Evidence:
     """The evidence of the sets of `found` under these criteria.
 
     Args:
         bench: with all recordings fitted; cut, of: as `criteria` have them.
-        effort: how far each fit is followed from where it was; two rounds by default.
+        course: how far each fit is followed from where it was; two rounds by default.
 
     Raises:
         InputError: a set that this bench does not offer, or moments that are no longer scanned.
     """
     if missing := sorted({k for s in found.sets for k in s.keys} - set(bench.candidates)):
         raise InputError(f"{', '.join(missing)}: not offered for these recordings now; search again")
-    effort = effort or Effort(rounds=2)
-    course = replace(effort.course, rounds=effort.rounds, iterations=effort.iterations)
+    course = course or Course(rounds=2)
     base, *others = found.sets
     # what happened at once comes in last: it begins beside the base with all else
     start = base.start(len(base.v) - len(found.moments))
-    scales, _ = based(bench, cut, of, criteria, replace(effort, course=course), Kept(), start)
+    scales, _ = based(bench, cut, of, criteria, Kept(), start, course)
     if found.noise_of is not None:
         scales.blocked = shown(scales.blocked, scales.bench, cut, scales.bench.predict(found.noise_of.values))
     known = known_moments(of) if found.moments else {}

@@ -19,7 +19,7 @@ from tissuejax.diagnosis.bench import Bench, Free
 from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.judgement.coloured import coloured, shown
 from tissuejax.diagnosis.judgement.criteria import Criteria
-from tissuejax.diagnosis.judgement.effort import Effort
+from tissuejax.diagnosis.judgement.effort import Course, Effort
 from tissuejax.diagnosis.judgement.explore import Exploration
 from tissuejax.diagnosis.judgement.kept import Kept
 from tissuejax.diagnosis.judgement.marginal import Blocked
@@ -58,13 +58,13 @@ def explore(bench: Bench, cut: Blocks, of: Discrepancy, by: Setup) -> Exploratio
         NotConverged: the base model can't be fitted at all.
     """
     by.report("fitting the base model")
-    scales, base = based(bench, cut, of, by.criteria, by.effort, by.kept)
+    scales, base = based(bench, cut, of, by.criteria, by.kept)
     e = searched(scales.bench, scales, base, by)
     for _ in range(by.effort.readings):
         if (noise := noise_beside(e)) is None:
             break
         best, scales = e.weighed[e.best], replace(scales, blocked=noise)
-        base = by.kept.weigh(scales, (), Start(base.refit.values), by.criteria, by.effort.course)
+        base = by.kept.weigh(scales, (), Start(base.refit.values), by.criteria, Course())
         e = searched(scales.bench, scales, base, by)
         e.noise_of = best
     e.look_again()
@@ -90,7 +90,7 @@ def searched(bench: Bench, scales: Scales, base: Weighed, by: Setup) -> Explorat
     """The sets that are worth it, weighed under the noise of these scales."""
     effort = by.effort
     e = alone(bench, scales, base, by)
-    scales, disturbed = disrupted(scales, base, by.criteria, effort.course)
+    scales, disturbed = disrupted(scales, base, by.criteria)
     if e.log_worth(disturbed) > e.worth(e.best):  # better than any single effect: all of them beside what happened
         e = alone(bench, scales, disturbed, by)
     if bench.costly:  # one start was all that the base had
@@ -117,19 +117,19 @@ def based(
     cut: Blocks,
     of: Discrepancy,
     criteria: Criteria,
-    effort: Effort,
     kept: Kept,
     start: Start | None = None,
+    course: Course | None = None,
 ) -> tuple[Scales, Weighed]:
     """The base model weighed, and the scales of the sample with the noise that its residual shows.
 
     Args:
-        start: of the base's fit; its neutral values by default.
+        start: of the base's fit; its neutral values by default. course: how far it is followed.
     """
-    start = start or Start({p: bench.start[p] for p in bench.base})
+    start, course = start or Start({p: bench.start[p] for p in bench.base}), course or Course()
     bench = bench.anchored(start.values)
     scales = scaled(bench, cut, of, bench.y, start.values, criteria)
-    base = kept.weigh(scales, (), start, criteria, effort.course)
+    base = kept.weigh(scales, (), start, criteria, course)
     if not np.isfinite(base.evidence.log_evidence):
         raise NotConverged(
             f"the base model can't be fitted to {', '.join(bench.fitted)}: its prediction is not finite there from any "
@@ -137,7 +137,7 @@ def based(
         )
     if (noise := coloured(scales.blocked, bench, cut, base.refit.prediction)) is not None:
         scales.blocked = noise
-        base = kept.weigh(scales, (), Start(base.refit.values), criteria, effort.course)
+        base = kept.weigh(scales, (), Start(base.refit.values), criteria, course)
     return scales, base
 
 

@@ -19,7 +19,6 @@ from scipy.linalg import cho_solve
 from scipy.special import logsumexp
 
 from tissuejax.diagnosis.judgement.criteria import Criteria
-from tissuejax.diagnosis.judgement.effort import Course
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, factored, marginal, smooth
 from tissuejax.diagnosis.judgement.scales import Scales
 from tissuejax.diagnosis.judgement.weigh import Start, Weighed, weigh
@@ -95,14 +94,12 @@ def narrowed(scales: Scales, w: Weighed, criteria: Criteria, these: Sequence[int
     return v
 
 
-def disrupted(
-    scales: Scales, base: Weighed, criteria: Criteria, course: Course | None = None
-) -> tuple[Scales, Weighed]:
+def disrupted(scales: Scales, base: Weighed, criteria: Criteria) -> tuple[Scales, Weighed]:
     """Scales and base with all that may have happened beside the base alone, one after the other."""
     while (happening := happened(scales, base, criteria)) is not None:
         start = Start(base.refit.values, happening.start(scales, base, criteria))
         scales = joined(scales, happening.moment)
-        base = weigh(scales, (), start, criteria, course)
+        base = weigh(scales, (), start, criteria)
         if not held(base, happening.moment):
             break
     return scales, base

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from tissuejax.diagnosis.judgement.answer import Answered
 from tissuejax.diagnosis.judgement.blocks import Blocks
-from tissuejax.diagnosis.judgement.effort import Effort
+from tissuejax.diagnosis.judgement.effort import Course, Effort
 from tissuejax.diagnosis.judgement.judge import Kind
 from tissuejax.diagnosis.kinds.recorded import Question, Recorded
 from tissuejax.diagnosis.known import tell
@@ -30,11 +30,10 @@ PROBING = Effort(
     reshaped=(2, 1),
     starts=1,
     spend=600.0,
-    rounds=2,
-    iterations=4,
     least=-1.0,
     given_up=6.0,
     stepwise=True,
+    course=Course(rounds=2, iterations=4),
 )
 
 
