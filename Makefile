@@ -25,10 +25,8 @@ types: $(STAMP)
 
 # A thread a worker: small matrices on two threads each, twice over, wait for one another. A file stays with one
 # worker, which compiles what its tests share once. Most of the time is compiling: tests run on code that XLA makes in
-# half the time and the C compiler in a fifth, and that runs half as fast; `make test QUICK= QUICK_C=` and `make slow`
-# compile as users do, and so do the first tests of the loop in C (tests/tled/test_lanes.py).
+# half the time and that runs half as fast; `make test QUICK=` and `make slow` compile as users do.
 QUICK ?= --xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=2
-QUICK_C ?= -Og
 
 # Tests of the lower floors, whose shapes and types are checked while they run (tests/conftest.py).
 SHAPED := tests/contracts/test_energies.py tests/contracts/test_energies_orders.py tests/contracts/test_elements.py \
@@ -38,8 +36,7 @@ SHAPED := tests/contracts/test_energies.py tests/contracts/test_energies_orders.
     tests/contracts/test_recordings_tables.py tests/contracts/test_effects.py tests/analytic/test_delayed.py
 # slipcover rewrites a line's counter away once it ran: 4 % more CPU, where coverage.py's tracer (before Python 3.12) took
 # 32 %. The longest files come first (tests/conftest.py).
-PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 XLA_FLAGS="$(QUICK)" TISSUEJAX_CFLAGS="$(QUICK_C)" \
-    $(BIN)/python -m slipcover --json
+PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 XLA_FLAGS="$(QUICK)" $(BIN)/python -m slipcover --json
 WORKERS := -m pytest -n 2 --dist loadfile --no-loadscope-reorder -q
 
 # What takes one core goes beside what takes two.

@@ -30,12 +30,6 @@ def asked_for(monkeypatch):
     monkeypatch.setattr(native, "wanted", lambda: True)
 
 
-@pytest.fixture
-def optimised(monkeypatch):
-    """Compiled as users do, whatever `make test` says: wide, and by glibc's functions of vectors."""
-    monkeypatch.delenv(library.OPTIONS, raising=False)
-
-
 @pytest.fixture(scope="module")
 def set_up():
     """A scene whose elements have memory, bent by a random displacement; forces by C and by XLA."""
@@ -65,7 +59,6 @@ def _pulled(forces, by_c, w):
     return lambda x, u: jnp.vdot(w, forces(x, u, by_c)[0]) + jnp.sum(forces(x, u, by_c)[1])
 
 
-@pytest.mark.usefixtures("optimised")
 @pytest.mark.parametrize(
     "derived",
     [
@@ -92,12 +85,12 @@ SIDES = Wedge(8e-3, 0.3, 2e-3, side=np.tile([1.0, 1.0, -1.0, -1.0], 4))  # of th
 
 
 FORMS = {"ball": Sphere(4e-3), "flat punch": Punch(3e-3, 1e-3), "blade": SIDES}
-LONG = pytest.mark.slow
 PAIRS = [
-    pytest.param(form, False, id=f"bare-{name}", marks=[LONG] * (name == "flat punch")) for name, form in FORMS.items()
+    pytest.param(form, False, id=f"bare-{name}", marks=[pytest.mark.slow] * (name == "flat punch"))
+    for name, form in FORMS.items()
 ]
-PAIRS += [  # half a minute each as users compile, two thirds of it C
-    pytest.param(form, True, id=f"friction and adhesion-{name}", marks=[LONG] * (name != "ball"))
+PAIRS += [  # half a minute each, most of it the C compiler's
+    pytest.param(form, True, id=f"friction and adhesion-{name}", marks=[pytest.mark.slow] * (name != "ball"))
     for name, form in FORMS.items()
 ]
 
@@ -105,8 +98,6 @@ PAIRS += [  # half a minute each as users compile, two thirds of it C
 @pytest.mark.parametrize(("form", "rough"), PAIRS)
 def test_contact_in_c_is_contact_by_xla(monkeypatch, form, rough):
     """Forces, torque, what rubbing lost and the memory after two places of the probe, their tangents and gradients."""
-    if form is FORMS["ball"] and not rough:
-        monkeypatch.delenv(library.OPTIONS, raising=False)  # as users compile
     made = cases.plain(box((0.02, 0.02, 0.01), (4, 4, 2)), np.arange(2.0), order=1)
     points = np.asarray(made.body.points)
     facets = boundary(np.asarray(made.body.cells), "hexahedron").nodes
@@ -182,7 +173,6 @@ def test_faces_in_c_are_faces_by_xla(monkeypatch, law):
     assert (lost == 0).any()
 
 
-@pytest.mark.usefixtures("optimised")
 def test_points_far_from_the_probe_cost_no_more_than_others():
     """Softness of a millimetre keeps every point within range of the exponential; with one of 5 um most are so far that
     it underflows, and a vector function that meets such a number goes through its vector one by one (twice as

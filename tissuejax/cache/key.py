@@ -20,8 +20,7 @@ import numpy as np
 from tissuejax.cache import source
 
 LIBRARIES = ("jax", "jaxlib", "numpy", "scipy", "equinox", "diffrax", "optimistix", "optax", "lineax")
-FLAGS = ("XLA_FLAGS", "TISSUEJAX_NATIVE", "TISSUEJAX_CFLAGS")
-FLAGS += ("JAX_DEFAULT_MATMUL_PRECISION", "JAX_ENABLE_X64", "JAX_NUMERICS")
+FLAGS = ("XLA_FLAGS", "TISSUEJAX_NATIVE", "JAX_DEFAULT_MATMUL_PRECISION", "JAX_ENABLE_X64", "JAX_NUMERICS")
 KNOWN = ("tissuejax", *LIBRARIES)  # packages whose code is part of the key, by hash or by version
 
 

@@ -1,7 +1,6 @@
 """A C compiler, where there is one: programs compiled once, kept by the hash of their text, and given to XLA by name.
 
-With `TISSUEJAX_NATIVE=off`, and where no compiler is, all is left to XLA: the same results to rounding. `CC` names
-another compiler, `TISSUEJAX_CFLAGS` more of its options, which come last.
+With `TISSUEJAX_NATIVE=off`, and where no compiler is, all is left to XLA: the same results to rounding.
 """
 
 import ctypes
@@ -20,7 +19,6 @@ import jax
 from tissuejax.cache.programs import own
 
 ENVIRONMENT = "TISSUEJAX_NATIVE"
-OPTIONS = "TISSUEJAX_CFLAGS"
 # compilers take half of an AVX-512 register unless told: a fifth (float32) to a third (float64) of a step
 WIDE = ("-mprefer-vector-width=512",) if platform.machine().lower() in ("x86_64", "amd64") else ()
 FLAGS = ("-O2", "-ftree-vectorize", "-march=native", "-std=gnu11", "-shared", "-fPIC", "-fopenmp-simd",
@@ -45,21 +43,16 @@ def compiler() -> str | None:
     return next((found for name in (named, "cc", "gcc", "clang") if name and (found := shutil.which(name))), None)
 
 
-def flags() -> tuple[str, ...]:
-    """Options of the compiler, the user's own last."""
-    return (*FLAGS, *os.environ.get(OPTIONS, "").split())
-
-
 @functools.cache
-def _around(options: tuple[str, ...]) -> str:
-    """What a compiled program depends on beside its text: compiler and its options, processor, JAX."""
+def _around() -> str:
+    """What a compiled program depends on beside its text: compiler, processor, JAX."""
     output = subprocess.run([str(compiler()), "--version"], capture_output=True, text=True, check=False).stdout
     try:
         seen = Path("/proc/cpuinfo").read_text()
-        abilities = next((line for line in seen.splitlines() if line.startswith(("flags", "Features"))), "")
+        flags = next((line for line in seen.splitlines() if line.startswith(("flags", "Features"))), "")
     except OSError:
-        abilities = platform.processor()
-    return "\n".join((output, abilities, platform.machine(), jax.__version__, " ".join((*options, *VECTOR_MATH))))
+        flags = platform.processor()
+    return "\n".join((output, flags, platform.machine(), jax.__version__, " ".join((*FLAGS, *VECTOR_MATH))))
 
 
 def named(text: str) -> str:
@@ -68,7 +61,7 @@ def named(text: str) -> str:
     Raises:
         NotCompiled: the compiler refused.
     """
-    name = "tissuejax_" + hashlib.sha256(f"{_around(flags())}\n{text}".encode()).hexdigest()[:32]
+    name = "tissuejax_" + hashlib.sha256(f"{_around()}\n{text}".encode()).hexdigest()[:32]
     with _lock:
         if name not in _loaded:
             # that of `cache.programs`, unless JAX was told of another
@@ -96,7 +89,7 @@ def _compiled(text: str, name: str, kept: Path | None) -> ctypes.CDLL:
         include = f"-I{jax.ffi.include_dir()}"
         output = ""
         for extra in (VECTOR_MATH, ()):
-            command = [str(compiler()), *flags(), include, str(source), "-o", str(made), *extra, "-lm", "-Wl,-z,defs"]
+            command = [str(compiler()), *FLAGS, include, str(source), "-o", str(made), *extra, "-lm", "-Wl,-z,defs"]
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             found = _load(made) if done.returncode == 0 else None
             if found is not None:
