@@ -263,6 +263,7 @@ def test_one_energy_of_the_catalogue_is_shown_by_any_of_its_names(capsys):
     assert "unknown energy" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_sensitivities_of_a_fit_with_one_relaxation_term(tmp_path, capsys):
     """The record names the effect; its number of terms is told by its constants."""
     recordings = str(Path(__file__).parents[1] / "data/demo/relaxing.h5")

@@ -50,6 +50,7 @@ def test_energy_lost_per_area_is_the_toughness(half_millimetre):
     assert (np.diff(front[np.isfinite(front)]) >= 0).all()
 
 
+@pytest.mark.slow
 def test_work_is_accounted_for_where_the_tissue_is_carried_onto_a_blade_at_rest():
     """Damping is relative to the support's pace: a body that is only carried along loses nothing, and the blade, at
     rest, does no work. With what damping takes from the whole speed a quarter of the work was laid to it."""

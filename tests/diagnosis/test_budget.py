@@ -1,6 +1,7 @@
 """A search that has spent what it may says so; each search of a diagnosis may spend that, and all of it counts."""
 
 import numpy as np
+import pytest
 
 from tissuejax.diagnosis.diagnose import asked_of, diagnose
 from tissuejax.diagnosis.judgement import search
@@ -27,6 +28,7 @@ def test_a_search_ends_when_its_budget_is_spent_and_says_so():
     assert found.as_dict()["effects"] == []
 
 
+@pytest.mark.slow
 def test_every_search_may_spend_as_much_as_the_first(monkeypatch):
     """Where noise is read again all sets are weighed anew, and what was weighed before is not in the answer."""
     ends = []

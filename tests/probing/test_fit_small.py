@@ -159,6 +159,7 @@ def test_a_fixed_set_on_a_line_floats():
         predictor(model(), sample(geometry=eqx.tree_at(lambda g: g.fixed, BODY, row)), settings=QUICK)
 
 
+@pytest.mark.slow
 def test_standard_errors_are_those_of_derivatives_at_lifes_pace():
     """A bulk modulus beside a shear modulus: what rings in a swift run told them apart, and errors came out too small.
 

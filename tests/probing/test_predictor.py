@@ -74,6 +74,7 @@ def test_effects_at_neutral_leave_the_scene_as_it_is(base):
             assert np.array_equal(channel.time, shown[name].time), effect.name
 
 
+@pytest.mark.slow
 def test_all_effects_at_neutral_reproduce_the_prediction(base, plain):
     chosen = [e for e in every_effect() if e.name not in HAS_SHAPE_OF_ITS_OWN]
     nested = base.with_model(model(*chosen))

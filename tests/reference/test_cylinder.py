@@ -71,6 +71,7 @@ def compressed() -> tuple[float, float, float]:
     return float(force * area / polygon), float(nominal * area), float(u[middle, 0])
 
 
+@pytest.mark.slow
 def test_force_and_bulge_of_the_compressed_cylinder():
     """Within 0.5 %."""
     force, theory, bulge = compressed()

@@ -86,10 +86,10 @@ SIDES = Wedge(8e-3, 0.3, 2e-3, side=np.tile([1.0, 1.0, -1.0, -1.0], 4))  # of th
 
 FORMS = {"ball": Sphere(4e-3), "flat punch": Punch(3e-3, 1e-3), "blade": SIDES}
 PAIRS = [
-    pytest.param(form, False, id=f"bare-{name}", marks=[pytest.mark.slow] * (name == "flat punch"))
+    pytest.param(form, False, id=f"bare-{name}", marks=[pytest.mark.slow] * (name != "ball"))
     for name, form in FORMS.items()
 ]
-PAIRS += [  # half a minute each, most of it the C compiler's
+PAIRS += [  # a third of a minute each, most of it the C compiler's
     pytest.param(form, True, id=f"friction and adhesion-{name}", marks=[pytest.mark.slow] * (name != "ball"))
     for name, form in FORMS.items()
 ]

@@ -81,6 +81,7 @@ def test_the_layer_factor_is_the_published_one(ratio, kappa):
     assert layer_factor(ratio, 20) == pytest.approx(kappa, rel=0.004)
 
 
+@pytest.mark.slow
 def test_a_punch_feels_a_bonded_layer_as_thick_as_it_is_wide():
     """0.1 mm deep, elements of a third of the radius: to some per cent."""
     height, depth, mu = 0.01, 1e-4, 2 * cases.NEO["C10"]
