@@ -36,12 +36,16 @@ SHAPED := tests/contracts/test_energies.py tests/contracts/test_energies_orders.
     tests/contracts/test_recordings_tables.py tests/contracts/test_effects.py tests/analytic/test_delayed.py
 # slipcover rewrites a line's counter away once it ran: 4 % more CPU, where coverage.py's tracer (before Python 3.12) took
 # 32 %. The longest files come first (tests/conftest.py).
-PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 XLA_FLAGS="$(QUICK)" $(BIN)/python -m slipcover --json
+# What one of a run's processes has compiled the others take from a folder, by the content of each program.
+PROGRAMS := JAX_COMPILATION_CACHE_DIR=$(abspath out/programs) JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0
+PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 XLA_FLAGS="$(QUICK)" $(PROGRAMS) $(BIN)/python -m slipcover --json
 WORKERS := -m pytest -n 2 --dist loadfile --no-loadscope-reorder -q
 
 # What takes one core goes beside what takes two.
 test: $(STAMP)
+	rm -rf out/programs
 	mkdir -p out
+	mkdir -m 700 out/programs
 	$(MAKE) --no-print-directory --jobs=2 --output-sync=target shaped lint types docs
 	$(PYTEST) --source tissuejax --out out/suite.coverage.json $(WORKERS) --durations=15 $(SHAPED:%=--ignore=%)
 	$(BIN)/python tests/coverage_table.py out/suite.coverage.json out/shaped.coverage.json

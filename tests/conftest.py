@@ -48,9 +48,9 @@ def pytest_configure(config):
     if PROGRAMS in os.environ or hasattr(config, "workerinput"):
         return
     config.programs = tempfile.mkdtemp(prefix="tissuejax-programs-")
-    os.environ |= {PROGRAMS: config.programs, "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.3"}
+    os.environ |= {PROGRAMS: config.programs, "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0"}
     jax.config.update("jax_compilation_cache_dir", config.programs)
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 
 
 def pytest_collection_modifyitems(items):

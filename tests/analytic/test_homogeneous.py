@@ -112,7 +112,7 @@ def test_compressibility_effect_is_the_compressible_model():
         ((), "logarithmic", 1.0, 1e-7),
         ((), "quadratic", -0.5, 2e-4),
         pytest.param(("anisotropy",), "logarithmic", 1.0, 1e-7, marks=pytest.mark.slow),
-        (("anisotropy",), "quadratic", -0.5, 2e-4),
+        pytest.param(("anisotropy",), "quadratic", -0.5, 2e-4, marks=pytest.mark.slow),
     ],
 )
 def test_compressibility_at_large_strain_is_a_volumetric_energy(form, power, close, fibres):

@@ -34,8 +34,8 @@ COUNTS = {
 }
 
 
-# the same files as one sample a material and one a specimen: seven seconds of reading each
-@pytest.mark.parametrize("side", [pytest.param(s, marks=[pytest.mark.slow] * ("ecoflex.t" in s)) for s in COUNTS])
+# 190 files, as one sample a material and one a specimen: ten seconds of reading each
+@pytest.mark.parametrize("side", [pytest.param(s, marks=[pytest.mark.slow] * ("ecoflex" in s)) for s in COUNTS])
 def test_every_sample_of_every_set_reads(side):
     found = files.read_all(FITS / side)
     assert (len(found), sum(len(s.recordings) for s in found.values())) == COUNTS[side]

@@ -8,7 +8,8 @@ from tissuejax.tled import seam
 from tissuejax.tled.simulate import run
 
 
-@pytest.mark.parametrize("friction", [None, pytest.param(0.1, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", [None, 0.1])
 def test_points_across_a_slice_repeat_each_other(monkeypatch, friction):
     """All 2 x 2 and 3 x 3 of them give the same forces, faces and losses, a third to a half of them as well."""
     same = dict(travel=0.006, frames=12, strength=3000.0, friction=friction)

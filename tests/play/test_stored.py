@@ -62,6 +62,7 @@ def test_a_file_without_states_is_refused(path, tmp_path):
         Run(short)
 
 
+@pytest.mark.slow
 def test_a_cutting_plays_back_with_the_force_on_its_blade(tmp_path):
     scene = slabs.cut(strength=3000.0, frames=24)
     seen = simulate.run(scene)

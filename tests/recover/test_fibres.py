@@ -31,6 +31,7 @@ def stretched():
 ALONG = {"energy.spread": 0.0, "energy.angle": 0.0}
 
 
+@pytest.mark.slow
 def test_idle_fibres_are_woken_at_a_shape_that_promises_something():
     posed = problem(predictor(tj.material("hgo"), stretched(), ("r",)), tj.Unknowns(fix=ALONG))
     at = posed.start | {"energy.mu": MU, "energy.k1": 0.0}

@@ -12,6 +12,7 @@ from tissuejax.surrogate.site_mesh import Grid
 from tissuejax.tled.stable import critical_steps, fastest
 
 
+@pytest.mark.slow
 def test_a_held_press_tends_to_static_equilibrium_and_rest_forgets():
     direct = Direct(direct_scene(made.matter(), made.SMALL, np.zeros(2)), 1.5e-3)
     begin, touch = direct.at, 0.018
