@@ -67,6 +67,7 @@ SEARCHED += tuple(f"criteria.smooth.{name}" for name in ("clock", "edge", "momen
 JUDGED = tuple(f"criteria.{name}" for name in rejudge.JUDGED if name != "lapse")
 # Of other kinds of recordings, or of a page: no sample of the panel feels them.
 ELSEWHERE = ("criteria.lapse", "criteria.simulated", "criteria.strokes", "criteria.unseen", "criteria.twins")
+ELSEWHERE += ("criteria.means.least",)  # of more than sixteen series
 ELSEWHERE += tuple(f"effort.{name}" for name in ("promised", "shown", "rivals", "course.shortened"))
 ELSEWHERE += tuple(f"criteria.shares.{name}" for name in ("marker", "onset", "peak", "numerical"))
 USUAL = "as they are"
