@@ -1,5 +1,6 @@
 """The command line: every command teaches, answers in JSON, and refuses with one sentence and exit code 2."""
 
+import functools
 import json
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 import trimesh
 
+from tissuejax import verbs
 from tissuejax.cache import source
 from tissuejax.cli import _warned, commands, listed, main
 
@@ -193,7 +195,10 @@ def test_an_empty_file_is_refused(tmp_path, capsys):
     assert "empty file" in capsys.readouterr().err
 
 
-def test_the_demo_fits_fails_to_fit_and_finds_out_why(capsys, tmp_path):
+@pytest.mark.parametrize("tried", [("viscoelasticity", "slack", "drift"), pytest.param(None, marks=pytest.mark.slow)])
+def test_the_demo_fits_fails_to_fit_and_finds_out_why(capsys, tmp_path, monkeypatch, tried):
+    """Among three effects, and among all of the catalogue, as a user has it."""
+    monkeypatch.setattr(verbs, "diagnose", functools.partial(verbs.diagnose, effects=tried))
     code, record = answer(capsys, "demo", "--out", str(tmp_path))
     assert code == 0
     assert record["elastic"]["holdout"]["holdout/nominal_stress"]["chi2_per_sample"] < 1.2

@@ -136,6 +136,7 @@ def test_scatter_up_to_twice_the_stated_level_is_noise_and_spikes_are_not(distur
     assert any("check the noise level" in w for w in answer.as_dict()["warnings"])
 
 
+@pytest.mark.slow
 def test_stiffness_that_comes_and_goes_is_no_periodic_load():
     answer = asked(recorded(waxing))
     assert "periodic" not in [e["name"] for e in answer.as_dict()["effects"]]

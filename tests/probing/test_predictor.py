@@ -84,28 +84,29 @@ def test_all_effects_at_neutral_reproduce_the_prediction(base, plain):
         assert np.abs(out.channels[name].values - channel.values).max() < 2e-5 * size, name
 
 
-def test_derivatives_equal_difference_quotients():
-    """Along one direction through base, contact, memory, support, inclusion and sensors at once, in float64."""
-    names = (
-        "friction",
-        "viscoelasticity",
-        "support-motion",
-        "inclusion",
-        "contact-offset",
-        "registration",
-        "clock-lag",
-        "force-drift",
-    )
+ACTING = {  # where derivatives are asked for; no effect is at its neutral value
+    "friction": {"coefficient": 0.2},
+    "viscoelasticity": {"g1": 0.2},
+    "support-motion": {"sin.r1": 3e-4},
+    "inclusion": {"contrast": 0.5},
+    # a sampled path has corners, and a step that falls on one has one-sided derivatives only (8 % apart at no delay)
+    "contact-offset": {"delay": 1.3e-3},
+    "registration": {"turn": 0.1},
+    "clock-lag": {"lag": 0.02},
+    "force-drift": {},
+}
+
+
+@pytest.mark.parametrize(
+    "names",
+    [("viscoelasticity", "contact-offset", "registration"), pytest.param(tuple(ACTING), marks=pytest.mark.slow)],
+    ids=["memory, contact and sensors", "contact with friction, support and an inclusion as well"],
+)
+def test_derivatives_equal_difference_quotients(names):
+    """Along one direction through base and effects at once, in float64."""
     p = predictor(model(*every_effect(*names)), sample(), settings=PRECISE)
     values = p.model.defaults | VALUES
-    values |= {
-        "effects.friction.coefficient": 0.2,
-        "effects.viscoelasticity.g1": 0.2,
-        "effects.inclusion.contrast": 0.5,
-    }
-    # a sampled path has corners, and a step that falls on one has one-sided derivatives only (8 % apart at no delay)
-    values |= {"effects.contact-offset.delay": 1.3e-3}
-    values |= {"effects.support-motion.sin.r1": 3e-4, "effects.clock-lag.lag": 0.02, "effects.registration.turn": 0.1}
+    values |= {f"effects.{name}.{k}": v for name in names for k, v in ACTING[name].items()}
     bare = p.model.across(())
     from tissuejax.experiments.homogeneous import local
 

@@ -77,7 +77,7 @@ def test_one_term_is_found_on_tension_and_compression_together():
     assert moduli["long_term"] == pytest.approx(0.65 * MU, rel=0.03)
 
 
-@pytest.mark.parametrize("terms", [1, 2, 3])
+@pytest.mark.parametrize("terms", [pytest.param(1, marks=pytest.mark.slow), 2, 3])
 @pytest.mark.parametrize(("energy", "seen"), [("reduced-polynomial-2", 1.1), ("demiray", 3.0)])
 def test_one_start_leads_to_the_relaxation_that_is_there(energy, seen, terms):
     """From a share of zero at the middle time, a whole step led into a corner: all of the stress, with the longest

@@ -72,6 +72,7 @@ def off(force: dict[int, float]) -> dict[int, float]:
     return {d: force[d] / FORCE[d] - 1 for d in FORCE}
 
 
+@pytest.mark.slow
 def test_a_small_mesh_meets_the_reference():
     """1,296 hexes in the quarter, facets of 0.66 mm, pressed at 20 mm/s: 4 % too high at 1 mm, half of it speed."""
     found = off(moving((12, 9)))

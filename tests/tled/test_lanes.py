@@ -90,8 +90,7 @@ PAIRS = [
     for name, form in FORMS.items()
 ]
 PAIRS += [  # a third of a minute each, most of it the C compiler's
-    pytest.param(form, True, id=f"friction and adhesion-{name}", marks=[pytest.mark.slow] * (name != "ball"))
-    for name, form in FORMS.items()
+    pytest.param(form, True, id=f"friction and adhesion-{name}", marks=pytest.mark.slow) for name, form in FORMS.items()
 ]
 
 
