@@ -114,6 +114,7 @@ def drawn(make, free, draws):
 
 
 TWO = ("energy.a", "energy.rate")
+SLOWER = [pytest.param(order, corner, marks=pytest.mark.slow) for order, corner in [(2, 0.2), (4, 0.1)]]
 CASES = {
     "white": lambda rng: toy_sample(rng, TRUE, n=60),
     "stated half": lambda rng: correlated_sample(rng, 0.0, 2.0, 1.0, n=60),
@@ -183,10 +184,7 @@ def filtered_sample(rng, order, corner, n=200):
     return sample
 
 
-@pytest.mark.parametrize(
-    ("order", "corner"),
-    [(1, 0.1), (2, 0.05), *(pytest.param(*x, marks=pytest.mark.slow) for x in [(2, 0.2), (4, 0.1)])],
-)
+@pytest.mark.parametrize(("order", "corner"), [(1, 0.1), (2, 0.05), *SLOWER])
 def test_intervals_hold_behind_a_rig_s_low_pass(order, corner):
     """Too narrow nowhere; at most 1.7 times too wide where the filter has neither of the two shapes."""
     scatter, std, inside = drawn(lambda rng: filtered_sample(rng, order, corner), TWO, 60)
