@@ -13,7 +13,7 @@ HERE = Path(__file__).resolve().parent
 sys.path += [str(HERE), str(HERE.parent / "challenge")]
 
 from ablation_settings import settings  # noqa: E402
-from study import file_of  # noqa: E402
+from panel_samples import file_of  # noqa: E402
 
 from tissuejax.challenge.panel import answered, read_causes, summary  # noqa: E402
 from tissuejax.diagnosis.judgement.evidence import read_evidence  # noqa: E402

@@ -20,6 +20,26 @@ LIVER_DEPTH, BALL = 0.020, 4.0e-3  # m: stand-in thickness of the liver, radius 
 SITES = 6
 PLATE = 8.0e-3  # m: diameter of the fungal cylinders
 
+KEPT = (
+    "verdict",
+    "confidence",
+    "reasons",
+    "effects",
+    "best_attempt",
+    "alternatives",
+    "explained",
+    "rest",
+    "warnings",
+    "fitted",
+    "held_out",
+    "before",
+    "after",
+    "probabilities",
+    "inclusion",
+    "something_missing",
+    "used",
+)
+
 
 @dataclass(frozen=True)
 class Entry:
@@ -58,6 +78,11 @@ def entries(causes: dict) -> list[Entry]:
         for p in causes["protocol"]
         for s in p["specimens"]
     ]
+
+
+def file_of(folder: Path, name: str, kind: str = "results") -> Path:
+    """Where the result of a sample lies, or (in "runs") its evidence."""
+    return folder / kind / f"{''.join(c if c.isalnum() else '-' for c in name)}.json"
 
 
 def recordings_folder() -> Path:

@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import panel_page
 import panel_samples
+from panel_samples import KEPT, file_of
 
 import tissuejax as tj
 from tissuejax.challenge.panel import answered, read_causes, summary
@@ -28,31 +29,6 @@ from tissuejax.diagnosis.judgement.judge import judge
 from tissuejax.diagnosis.judgement.rejudge import verdict_of
 from tissuejax.progress import for_terminal
 from tissuejax.storage import write_json
-
-KEPT = (
-    "verdict",
-    "confidence",
-    "reasons",
-    "effects",
-    "best_attempt",
-    "alternatives",
-    "explained",
-    "rest",
-    "warnings",
-    "fitted",
-    "held_out",
-    "before",
-    "after",
-    "probabilities",
-    "inclusion",
-    "something_missing",
-    "used",
-)
-
-
-def file_of(folder: Path, name: str, kind: str = "results") -> Path:
-    """Where the result of a sample lies, or (in "runs") its evidence."""
-    return folder / kind / f"{''.join(c if c.isalnum() else '-' for c in name)}.json"
 
 
 def diagnosed(entry: panel_samples.Entry, evidence: Path) -> dict:

@@ -18,8 +18,8 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
 import matters  # noqa: E402
+from panel_samples import file_of  # noqa: E402
 from remembered import Remembered  # noqa: E402
-from study import file_of  # noqa: E402
 from threadpoolctl import threadpool_limits  # noqa: E402
 
 from tissuejax.cache.programs import keep_programs  # noqa: E402
