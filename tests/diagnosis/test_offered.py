@@ -124,6 +124,24 @@ def test_two_rates_show_relaxation_without_a_hold():
     assert "viscoelasticity" not in names(RAMP, RAMP)
 
 
+def test_a_pull_that_changes_its_pace_is_not_held():
+    quick_at_the_end = np.interp(TIME, [0, 18, 20], [1.0, 1.1, 1.6])  # 45 times as quick, each strain passed once
+    assert not names(quick_at_the_end) & {"viscoelasticity"}
+    assert not paced(sample(quick_at_the_end))
+
+
+def test_a_hold_in_which_the_machine_hunts_is_one():
+    assert "viscoelasticity" in names(HOLD + 5e-4 * np.sin(2 * np.pi * TIME))  # 0.3 % of the range, up and down
+
+
+def test_strips_at_right_angles_are_fibres_or_two_strips():
+    x, y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+    kept, _ = offered(sample(CYCLE, CYCLE, direction=(x, y)), CANDIDATES)
+    assert {"anisotropy", "specimen-scatter"} <= {c.name for c in kept.values()}
+    # else a law's form has a gain of each strip's own, and two strips that differ are another law
+    assert all("gain" not in c.widens for c in kept.values() if c.name == "energy-form")
+
+
 def test_aging_needs_times_and_fibres_need_directions():
     x, y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
     assert not names(CYCLE, CYCLE, start=(0.0, 0.0), direction=(x, x)) & {"aging", "anisotropy"}

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from tissuejax.diagnosis.bench import Candidate
 from tissuejax.diagnosis.judgement.particular import SHOWN, Shown
@@ -87,9 +88,12 @@ def direction(r: Recording) -> tuple[float, ...]:
 
 
 def alike(a: Recording, b: Recording) -> bool:
-    """Whether two recordings are one kind of test along one direction, sheared at one axial stretch."""
+    """Whether two recordings are one kind of test, sheared at one axial stretch.
+
+    Along whichever direction: a law without fibres says the same of all, and then it is another for each strip.
+    """
     axial = [float(r.attributes.get("axial_stretch", 1.0)) for r in (a, b)]
-    return (a.experiment, direction(a)) == (b.experiment, direction(b)) and abs(axial[0] - axial[1]) < 1e-6
+    return a.experiment == b.experiment and abs(axial[0] - axial[1]) < 1e-6
 
 
 def overlap(a: Recording, b: Recording, shown: Shown = SHOWN) -> float:
@@ -113,7 +117,10 @@ def driven(r: Recording) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def motion(time: np.ndarray, x: np.ndarray, shown: Shown = SHOWN) -> tuple[bool, float, bool]:
-    """Whether it comes back, its quickest sustained rate, and whether it is held."""
+    """Whether it comes back, its quickest sustained rate, and whether it is held.
+
+    A pull that only goes slower for a while is not held: its time is a function of the strain, as that of any pull.
+    """
     span = float(np.ptp(x)) or 1.0
     back = max(float(np.max(np.maximum.accumulate(side) - side)) for side in (x, -x))
     way = max(float(np.max(side) - side[0]) for side in (x, -x))
@@ -122,8 +129,9 @@ def motion(time: np.ndarray, x: np.ndarray, shown: Shown = SHOWN) -> tuple[bool,
     )
     rate = np.abs(np.diff(x)) / np.maximum(np.diff(time), 1e-12)
     quick = float(np.quantile(rate, shown.quick)) if len(rate) else 0.0
-    still = float(np.sum(np.diff(time)[rate < shown.still * float(np.max(rate, initial=0.0))]))
-    return turns, quick, still > shown.held * float(np.ptp(time))
+    path = np.interp(np.linspace(time[0], time[-1], shown.points), time, x)
+    moved = np.ptp(sliding_window_view(path, int(shown.held * shown.points) + 1), axis=1)
+    return turns, quick, float(np.min(moved)) <= shown.still * span
 
 
 def paced(sample: Sample, shown: Shown = SHOWN) -> bool:

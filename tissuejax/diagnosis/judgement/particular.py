@@ -13,7 +13,8 @@ class Shown:
 
     Attributes:
         back: way back that is an unloading, share of the range of strain. Ground: a machine overshoots by less.
-        still: rate below which a specimen is held, share of its quickest. Ground: a hold creeps by less.
+        still: strain by which a specimen that is held still moves, share of its range. Ground: controllers hunt and
+            grips creep by less.
         rates: ratio from which two rates are two. Ground: rates of a series are decades or at least twice apart;
             machines keep one to a tenth.
         near: strains closer than this are one, share of the largest. Ground: what a gauge length is known to.
@@ -28,7 +29,7 @@ class Shown:
     """
 
     back: float = 0.05
-    still: float = 0.05
+    still: float = 0.005
     rates: float = 1.5
     near: float = 0.05
     shared: float = 0.5
