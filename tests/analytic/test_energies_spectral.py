@@ -100,3 +100,28 @@ def test_powers_of_a_tensor():
     root, inverse = spectral.powers(C, (0.5, -1))
     np.testing.assert_allclose(root.matrix() @ root.matrix(), C.matrix(), atol=1e-14)
     np.testing.assert_allclose(inverse.matrix() @ C.matrix(), np.eye(3), atol=1e-14)
+
+
+def by_eigenvalues(m, v, s):
+    """tr C^s ln(C)^m and C^s ln(C)^m by numpy, C of the components v."""
+    values, vectors = np.linalg.eigh(np.asarray(matrix(v)))
+    f = values**s * np.log(values) ** m
+    return f.sum(), (vectors * f) @ vectors.T
+
+
+@pytest.mark.parametrize("m", [0, 1, 2])
+def test_powers_with_logarithms_have_the_slopes_of_numpy(m):
+    v, s = np.array(POINTS["wide"]), 0.7
+    dv = np.array([0.3, -0.2, 0.4, 0.1, -0.3, 0.2])
+    step = 1e-5
+    ahead, behind = (by_eigenvalues(m, v + e * dv, s) for e in (step, -step))
+    _, trace = jax.jvp(lambda x: spectral._traces(m, Sym(*x), jnp.array([s])), (jnp.array(v),), (jnp.array(dv),))
+    assert float(trace[0]) == pytest.approx((ahead[0] - behind[0]) / (2 * step), rel=1e-7)
+
+    def slope(s):  # of the tensor, along dv
+        return spectral._derivative(m, Sym(*jnp.array(v)), jnp.array([s]), Sym(*jnp.array(dv)))
+
+    one, other = ([by_eigenvalues(m, v + e * dv, t)[1] for e in (step, -step)] for t in (s + step, s - step))
+    mixed = ((one[0] - one[1]) - (other[0] - other[1])) / (4 * step**2)
+    _, found = jax.jvp(slope, (s,), (1.0,))
+    assert np.asarray(found.matrix())[0] == pytest.approx(mixed, abs=1e-4 * np.max(np.abs(mixed)))
