@@ -1,21 +1,22 @@
 """What a linear step of an effect promises, where all is a straight line: chi-squares and prices in dense matrices."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from straight_bench import GAIN, as_weighed, covariance, scales_of, straight
+from straight_bench import DRIVE, GAIN, Straight, as_weighed, covariance, scales_of, straight
 
+from tissuejax.diagnosis.bench import Candidate, Free
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.nominate import nominated
 
 USUAL = Criteria()
 AT = {"a": 10.0, "b": 20.0}
 BEFORE = SimpleNamespace(
-    odds={"push": 1.0, "shift": 0.1, "own": 1.0, "noted": 0.1, "bend": 1.0},
-    forms={"push": 1, "shift": 1, "own": 3, "noted": 1, "bend": 2},
+    odds={"gap": 0.1, "push": 1.0, "shift": 0.1, "own": 1.0, "noted": 0.1, "bend": 1.0},
+    forms={"gap": 1, "push": 1, "shift": 1, "own": 3, "noted": 1, "bend": 2},
 )
 
 
@@ -154,3 +155,43 @@ def test_what_an_effect_that_does_nothing_promises_is_its_prior_alone():
     (found,), _ = told(bench, "own")
     assert found.gain == pytest.approx(math.log(1 / 3))
     assert found.step == {"idle.x": 0.0}
+
+
+class Gapped(Straight):
+    """The first 40 x of a line is lost in a gap."""
+
+    def column(self, path, onset):
+        return -40.0 * (DRIVE > 0) if path == "gap.g" else super().column(path, onset)
+
+    def predict(self, values, recordings=None):
+        gap = dict(values).get("gap.g", 0.0)
+        return super().predict({**values, "gap.g": 0.0}) - 40 * np.minimum(DRIVE, gap)
+
+
+def gapped(corners: tuple[float, ...]) -> Gapped:
+    """A gap of 0.2."""
+    plain = straight({})
+    candidates = {"gap": Candidate("gap", ("gap.g",), corners={"gap.g": corners} if corners else {}, rig=True)}
+    free, start = {**plain.free, "gap.g": Free(0.0, 1.0, 0.1)}, {**plain.start, "gap.g": 0.0}
+    left = {f.name: getattr(plain, f.name) for f in fields(plain)}
+    return Gapped(**left | {"candidates": candidates, "free": free, "start": start, "y": plain.y - whole(0.2)})
+
+
+def whole(gap: float) -> np.ndarray:
+    return 40 * np.minimum(DRIVE, gap)
+
+
+def test_what_moves_a_corner_is_scored_by_what_it_does_as_a_whole():
+    """By its slope at nothing a gap lowers a line by the same everywhere, by what it does where it ends. Of the size
+    that is right the promise is what the misfit loses, less the price of a line."""
+    (found,), scales = told(gapped((0.05, 0.2, 0.5)), "gap")
+    c = scales.cut.mean(-whole(0.2) / 0.2)[:, None]
+    left = scales.cut.mean(scales.bench.y - scales.bench.predict(AT))
+    ways = [promised(scales, left, c, USUAL.rig, "gap", v) for v in (0.0, USUAL.shares["gain"] ** 2)]
+    worth, step = max(ways, key=lambda way: way[0])
+    assert found.gain == pytest.approx(worth, rel=1e-6)
+    assert found.step["gap.g"] == pytest.approx(step[0], rel=1e-6)
+    assert step[0] == pytest.approx(0.2, rel=0.01)
+    (by_slope,), _ = told(gapped(()), "gap")
+    assert by_slope.gain < 0.9 * worth
+    assert by_slope.step["gap.g"] < 0.15

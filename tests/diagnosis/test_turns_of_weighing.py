@@ -19,7 +19,7 @@ from tissuejax.diagnosis.judgement.weigh import Start, beside, kurtosis, weigh
 from tissuejax.estimation.discrepancy import Part
 
 USUAL = Criteria()
-climb_of: Any = module._amplitudes
+climb_of: Any = module.climb
 idle: Any = module._idle
 AT = {"a": 10.0, "b": 20.0}
 ERRS = Part("effects", "effect", factor=np.linspace(0, 1, 2 * MEANS)[:, None])
@@ -30,7 +30,7 @@ class Asked:
 
     def __init__(self, monkeypatch, scales: Scales):
         self.fits, self.about, self.climbs = [], [], []
-        for name, into in (("refit", self.fits), ("_amplitudes", self.climbs)):
+        for name, into in (("refit", self.fits), ("climb", self.climbs)):
             monkeypatch.setattr(module, name, self.told(getattr(module, name), into))
         scales.about = self.told(scales.about, self.about)
 
@@ -75,7 +75,7 @@ def test_each_turn_fits_beside_the_amplitudes_of_the_one_before(monkeypatch):
     begun = [given[3] for given, *_ in asked.fits]
     assert begun == [{**AT, "own.x": 0.3}, *(out.values for *_, out in asked.fits[:-1])]
     assert [given[5] for given, *_ in asked.climbs] == [{"wide"}, *[{"there"}] * (len(asked.climbs) - 1)]
-    assert {given[6] for given, *_ in asked.climbs} == {-math.inf}
+    assert {given[6].settled for given, *_ in asked.climbs} == {-math.inf}
 
 
 def test_where_predictions_are_costly_both_starts_of_the_amplitudes_are_tried_and_fits_are_as_rough_as_the_first(
@@ -167,10 +167,10 @@ class Stepwise:
         monkeypatch.setattr(module, "refit", lambda *a, **b: turns.append(1) or real(*a, **b))
         monkeypatch.setattr(module, "amplitude_mass", lambda *_: next(coming))
 
-        def still(linear, parts, widths, blocked, v, begin, settled):
+        def still(linear, parts, widths, blocked, v, begin, course):
             return np.zeros(1), marginal(linear, parts, np.zeros(1), blocked)
 
-        monkeypatch.setattr(module, "_amplitudes", still)
+        monkeypatch.setattr(module, "climb", still)
         self.turns = turns
 
     def weigh(self, at=AT, **course):
@@ -302,7 +302,10 @@ def test_amplitudes_are_sought_from_where_all_is_wide_or_from_where_they_are_and
         return np.array([0.01 * len(calls), 0.0, 0.0]), SimpleNamespace(value=value)
 
     monkeypatch.setattr(module, "amplitudes", climb)
-    v, m = climb_of(None, (ONE, TWO, WITHIN), widths, None, np.array([4.0, 5.0, 6.0]), frozenset(begin), 0.3)
+    monkeypatch.setattr(module, "uphill", lambda *_: 1.0)
+    v, m = climb_of(
+        None, (ONE, TWO, WITHIN), widths, None, np.array([4.0, 5.0, 6.0]), frozenset(begin), Course(settled=0.3)
+    )
     begun = {"v": [4.0, 0.0, 6.0], "first": [0.01, 0.0, 0.0]}
     for (priors, at, tolerance), (which, where, least) in zip(calls, asked, strict=True):
         expected = widths.widest if which == "widest" else widths
@@ -325,7 +328,7 @@ def test_the_better_amplitudes_are_those_of_evidence_and_prior_together(monkeypa
             return np.array([v]), SimpleNamespace(value=value)
 
         monkeypatch.setattr(module, "amplitudes", climb)
-        v, _ = climb_of(None, (ONE,), widths, None, np.ones(1), frozenset({"wide", "there"}), 0.1)
+        v, _ = climb_of(None, (ONE,), widths, None, np.ones(1), frozenset({"wide", "there"}), Course())
         assert v[0] == expected
 
 
@@ -335,7 +338,7 @@ def test_amplitudes_are_found_from_where_all_is_wide(rng):
     residual = part.factor @ rng.normal(0, 0.9, 12) + 0.01 * rng.standard_normal(n)
     linear = Linear(residual, np.ones((n, 1)), np.zeros(1), np.zeros(1))
     blocked, widths = Blocked((slice(0, n),), np.full(n, 0.01)), Widths(np.array([0.1]), np.array([0.1]))
-    v, m = climb_of(linear, (part,), widths, blocked, np.array([0.01]), frozenset({"wide"}), 0.1)
+    v, m = climb_of(linear, (part,), widths, blocked, np.array([0.01]), frozenset({"wide"}), Course())
     grid = np.linspace(0.3, 3.0, 2000)
     worth = [marginal(linear, (part,), np.array([x**2]), blocked).value for x in grid]
     worth += widths.log_density((grid**2)[:, None])[:, 0]
@@ -367,3 +370,24 @@ def test_what_is_felt_of_an_effect_is_the_most_of_its_amplitudes():
     assert idle(bench.candidates["shift"], fit, bench, 1.0, {"shift.x": 0.4e-6, "shift.y": 1.0})
     assert idle(bench.candidates["shift"], fit, bench, 1.0, {})
     assert asked == [{**AT, "shift.x": 0.0, "shift.y": 0.0}] * 2
+
+
+def test_a_climb_that_ends_on_a_slope_begins_anew_from_the_widths(monkeypatch):
+    """Where all is wide that may be; and no other does, however much more it could gain."""
+    widths = Widths(np.array([0.1, 0.2]), np.array([0.1, 0.0]))
+    for steep, asked in ((10.5, 3), (9.5, 1)):
+        calls = []
+
+        def climb(linear, parts, priors, blocked, v, tolerance=0.02, calls=calls):
+            calls.append((priors.width.tolist(), v.tolist(), tolerance))
+            return np.array([0.01 * len(calls), 0.0]), SimpleNamespace(value=1e6 * len(calls))
+
+        monkeypatch.setattr(module, "amplitudes", climb)
+        monkeypatch.setattr(module, "uphill", lambda *_, steep=steep: steep)
+        v, _ = climb_of(None, (ONE, WITHIN), widths, None, np.array([4.0, 5.0]), frozenset({"there"}), Course())
+        assert calls[0] == ([0.1, 0.2], [4.0, 5.0], 0.02)
+        assert len(calls) == asked
+        assert v[0] == pytest.approx(0.01 * asked)
+        if asked == 3:
+            assert calls[1] == (widths.widest.width.tolist(), pytest.approx([0.01, 0.04]), Course().settled)
+            assert calls[2] == ([0.1, 0.2], [0.02, 0.0], 0.02)

@@ -58,6 +58,7 @@ class Candidate:
             a candidate has no parameters of its own.
         rig: a fault of the rig, and not of the tissue.
         spectral: path of a frequency that is read from the residual's periodogram, and how many of its lines are tried.
+        corners: by path, sizes of an amplitude at which what it does is scored as a whole (`effects.form.Form`).
         placed: of probings: settings of the shapes by where the probe went deepest (`effects.form.Form`).
         heard: of probings: the channel whose periodogram `spectral` reads.
         lacking: by property of the protocol, families that it widens too where the protocol lacks that.
@@ -74,6 +75,7 @@ class Candidate:
     widens: Mapping[str, float] = field(default_factory=dict)
     rig: bool = False
     spectral: tuple[str, int] | None = None
+    corners: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     placed: Placed | None = None
     heard: str = ""
     lacking: Mapping[str, Mapping[str, float]] = field(default_factory=dict)

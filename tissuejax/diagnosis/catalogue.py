@@ -72,6 +72,7 @@ class Entry(Offer):
                     nominated=form.nominated,
                     rig=self.effect.order == 0,
                     spectral=form.spectral and (f"{prefix}.{form.spectral[0]}", form.spectral[1]),
+                    corners={f"{prefix}.{name}": sizes for name, sizes in form.corners.items()},
                     placed=form.placed,
                     heard=form.heard,
                     widens=dict(form.widens),

@@ -35,6 +35,8 @@ class Form:
         beside: names of forms that it is tried beside, whatever the order.
         spectral: a frequency that is read from the residual's periodogram, and how many of its lines are tried; of a
             probing's markers where it has any.
+        corners: sizes of amplitudes at which what they do is scored as a whole: a corner moves with them, and no slope
+            at neutral says what they do.
         placed: of probings: shapes that are scanned by where the probe went deepest: of these places by recording, m,
             and the tissue's height there, m, settings of the shapes.
         heard: of probings: the channel whose periodogram `spectral` reads; "" for markers where it has any.
@@ -52,6 +54,7 @@ class Form:
     most: Mapping[str, float] = field(default_factory=dict)
     beside: tuple[str, ...] = ()
     spectral: tuple[str, int] | None = None
+    corners: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     placed: Placed | None = None
     heard: str = ""
     widens: Mapping[str, float] = field(default_factory=dict)

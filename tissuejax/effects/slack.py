@@ -12,6 +12,8 @@ from tissuejax.effects.form import Form, Offer, Sizes
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.parameters import Parameter
 
+CORNERS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.3)  # of the largest strain: where a gap may end
+
 
 class Slack(Effect):
     """Specimen's strain is the recorded one short of `gap`, and zero inside the gap; or it is ahead of it by `preload`.
@@ -43,7 +45,7 @@ class Slack(Effect):
     def in_material_tests(cls, sizes: Sizes) -> Offer:
         """See `Effect.in_material_tests`."""
         forms = (
-            Form("", ("gap",)),
+            Form("", ("gap",), corners={"gap": tuple(s * sizes.strain for s in CORNERS)}),
             Form("rounded", ("gap", "roundness"), {"roundness": (0.4, 1.0)}, nominated=False),
             Form("loaded before", ("preload",)),
         )

@@ -15,12 +15,14 @@ the model of Kennedy and O'Hagan (2001), with the parts that rests of material t
 | waning gain | the stress times exponential in time (0.5 of the recording): stiffness that comes and goes, or is lost |
 | white | what scatters from sample to sample beyond the stated noise |
 | effects | squared exponential (0.5) in strain, and in log time if its law knows time, times what an effect does |
+| zero | the stress's slope in strain, over its range: where the strain of each series counts from |
+| clock | the stress's slope in time, times that between two samples: by whose clock each recording's force is read |
 | sudden | what happens at once, where a judgement has found that something may have (`estimation.sudden`) |
 
 Amplitudes a_k are shares of the stress that the model predicts (law, gain, waning gain), of its peak in the recording
-(hysteresis), or of the measured peak there (slow, white). Of what the model predicts: about the stress of another model
-a gain could bring that model's answer in, and about the measured peak a part that all specimens share would carry how
-they differ. Lengths and times are those of `Smoothness`.
+(hysteresis), or of the measured peak there (slow, white); of the range of the strain (zero); samples (clock). Of what
+the model predicts: about the stress of another model a gain could bring that model's answer in, and about the measured
+peak a part that all specimens share would carry how they differ. Lengths and times are those of `Smoothness`.
 
 Source: Kennedy and O'Hagan 2001, J. R. Statist. Soc. B 63; the loading state: Krasnosel'skii and Pokrovskii 1989.
 """
@@ -49,6 +51,7 @@ class Series:
         states: loading states (`loading_states`), one column a shape.
         peak: typical largest stress of its recording, Pa.
         start: when its recording began, s on the session's clock; all alike where the order is not known.
+        sampled: time between two of its samples, s.
     """
 
     recording: str
@@ -58,6 +61,7 @@ class Series:
     states: Float[np.ndarray, "n w"]
     peak: float
     start: float = 0.0
+    sampled: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,7 @@ class Part:
 
     Attributes:
         name: e.g. "gain", "hysteresis, wide".
-        family: "law", "gain", "hysteresis", "added law", "slow", "white", "effect" or "sudden".
+        family: "law", "gain", "hysteresis", "added law", "slow", "white", "effect", "zero", "clock" or "sudden".
         factor: B = factor factor' (smooth parts have few columns), or None.
         within: B is block-diagonal, a block for each series; or None.
     """
@@ -142,7 +146,9 @@ class Discrepancy:
         nearly: factors of what the law of an effect errs by, about a change of the stress of one: smooth in strain,
             shared by the series of a mode, and a gain of each recording's own. in_time: the same of a law that knows
             time, smooth in strain and in the logarithm of time.
-        timed: when each row was measured; None where what happens at once is not looked for.
+        timed: when each row was measured; None where neither what was set before a recording began nor what happens at
+            once is looked for.
+        sampled: by row, the time between two samples as a share of its series' duration; None where time says nothing.
         sudden: what may have happened at once.
     """
 
@@ -155,6 +161,7 @@ class Discrepancy:
     nearly: Float[np.ndarray, "N e"]
     in_time: Float[np.ndarray, "N f"]
     timed: Timed | None = None
+    sampled: Float[np.ndarray, " N"] | None = None
     sudden: tuple[Moment, ...] = ()
 
     def about(self, prediction: Float[np.ndarray, " N"], done: Sequence[Done] = ()) -> tuple[Part, ...]:
@@ -178,8 +185,18 @@ class Discrepancy:
         errs = errs or [np.zeros((len(prediction), 1))]
         effects = Part("effects", "effect", np.concatenate(errs, axis=1))
         disturbed = None if self.timed is None else Disturbed(prediction, self.timed)
+        before = () if disturbed is None else self._set_before(disturbed)
         once = tuple(Part(s.name, "sudden", s.factor(disturbed)) for s in self.sudden if disturbed is not None)
-        return (*laws, *several, *turning, *self.fixed, effects, *changing, *once)
+        return (*laws, *several, *turning, *self.fixed, effects, *changing, *before, *once)
+
+    def _set_before(self, of: Disturbed) -> tuple[Part, ...]:
+        """What was set before a recording began: where each series' strain counts from, by whose clock its force is
+        read."""
+        owner = of.timed.owner[:, None] == np.unique(of.timed.owner)
+        zero = Part("zero", "zero", of.stiffness[:, None] * owner)
+        if self.sampled is None:
+            return (zero,)
+        return zero, Part("clock", "clock", (of.rate * self.sampled)[:, None] * self.belongs)
 
 
 def discrepancy(
@@ -195,7 +212,7 @@ def discrepancy(
         sigma: noise of each entry, Pa; entries that are means of more samples scatter less.
         paced: whether time is more than a function of the strain: else a gain that wanes is a law of each recording's
             own, and that part is left out, and what an effect's law errs by is smooth in strain alone.
-        at_once: whether what happens at once is looked for.
+        at_once: whether what was set before a recording began and what happens at once is looked for.
         smooth: lengths and times; of the series' loading states too.
     """
     of = np.repeat(np.arange(len(series)), [len(s.time) for s in series])
@@ -237,6 +254,7 @@ def discrepancy(
     several = {m for m in modes if len({s.recording for s in series if s.mode == m}) > 1}
     own = shared(smooth.law["law"], [(s.recording, s.mode) if s.mode in several else None for s in series])
     belongs_to = (belongs[:, None] == np.arange(len(recordings))).astype(float)
+    sampled = np.array([s.sampled / (float(np.ptp(s.time)) or 1.0) for s in series])[of]
     return Discrepancy(
         laws,
         belongs_to,
@@ -247,6 +265,7 @@ def discrepancy(
         np.concatenate([shared(smooth.law["law"], modes), belongs_to], axis=1),
         np.concatenate([shared(smooth.law["law"], modes, timed=paced), belongs_to], axis=1),
         _timed(series, of, belongs, smooth) if at_once else None,
+        sampled if paced else None,
     )
 
 

@@ -29,6 +29,8 @@ PARTS = {
     "mesh": "what the mesh of the simulation leaves open",
     "speed": "what the speed of the simulation leaves open",
     "ringing": "what rings in the simulation where the probe starts or stops",
+    "zero": "where the strain counts from",
+    "clock": "by whose clock the force is read",
     "effects": "what the law of what is named errs by",
     "crosstalk": "vertical force in the lateral ones",
     "onset": "where the surface is met",

@@ -111,6 +111,7 @@ def series(
                 own.mean(loading_states(strain(s), smooth)),
                 float(max(peaks)) or 1.0,
                 (starts or {}).get(s.recording, 0.0),
+                float(np.median(np.diff(s.time))) if len(s.time) > 1 else 0.0,
             )
         )
     return out

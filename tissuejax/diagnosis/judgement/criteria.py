@@ -41,13 +41,16 @@ class Criteria:
             was registered); of the law of a tissue's effect, of what that effect does and the base could not (two
             exponentials and a constant leave 3, 7 and 10 % of a relaxation by a power of time over two, three and four
             decades; with it the right answers of `fits/real-panel` err by 10.5 %, which is no independent ground); of
-            the numerical error, in units of what mesh and speed leave open by Richardson's extrapolation.
+            the numerical error, in units of what mesh and speed leave open by Richardson's extrapolation; of a zero,
+            half a per cent of the range of the strain (extensometers are verified to 0.5 or 1 %, ISO 9513; a specimen
+            is set to zero by hand or at a threshold of force); of a clock, one sample.
         strange: by which factor such a part is wider. Ground: 10 makes of 1 to 2 % the 10 to
             20 % by which effects of the catalogue change a recording.
         partly: chance that a part which one form of an effect widens is wide beside another form of it. Ground: as
             likely as not.
         settled: families that are never wider: what they are is known, or (an added law) nothing but what another part
-            is already: a law beside the base is a share of the stress.
+            is already (a law beside the base is a share of the stress), or it has a name from there on (slack, a clock
+            that lags).
         sudden: standard deviation of the half-normal prior of what happens at once, where something does: share of the
             stress. Ground: a slip or a step worth a word is some per cent to a third of what is measured. Elsewhere it
             is `shares["sudden"]`: as good as nothing.
@@ -93,13 +96,14 @@ class Criteria:
     shares: Mapping[str, float] = field(
         default_factory=lambda: (
             {"law": 0.015, "gain": 0.015, "hysteresis": 0.01, "added law": 0.01, "slow": 0.01, "white": 0.005}
+            | {"zero": 0.005, "clock": 1.0}
             | {"marker gain": 0.015, "crosstalk": 0.015}
             | {"effect": 0.1, "marker": 0.02, "onset": 0.01, "peak": 0.05, "numerical": 1.0, "sudden": 1e-4}
         )
     )
     strange: float = 10.0
     partly: float = 0.5
-    settled: frozenset[str] = frozenset({"peak", "effect", "added law"})
+    settled: frozenset[str] = frozenset({"peak", "effect", "added law", "zero", "clock"})
     sudden: float = 0.1
     recurs: float = 0.5
     change: float = 0.3

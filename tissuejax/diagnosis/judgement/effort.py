@@ -14,6 +14,8 @@ class Course:
         first, later: chi-square that a step of a fit has to promise, in the first round and in later ones (of costly
             predictions that of the first). Ground: half a unit changes no evidence by more than a quarter of a nat.
         settled: nats: a round that gains less is the last. Ground: no verdict turns on a tenth of a nat.
+        steep: nats that an amplitude of the discrepancy alone promises by its slope, from where on a climb has ended on
+            no maximum and begins anew. Ground: those that do end on one promise less than a nat, the lost one 1e9.
         shortened: halvings of a step to where a fine simulation fails. Ground: cost; a thirtieth of the step is left.
         floor: log evidence below which a set is hopeless and not followed further.
         anchor: whether a cheap simulation's correction is taken anew where the fit comes to rest.
@@ -24,6 +26,7 @@ class Course:
     first: float = 0.5
     later: float = 0.1
     settled: float = 0.1
+    steep: float = 10.0
     shortened: int = 5
     floor: float = -math.inf
     anchor: bool = True

@@ -336,3 +336,13 @@ def amplitudes(
         if gained < tolerance:
             break
     return u * unit, m
+
+
+def uphill(v: Float[np.ndarray, " K"], m: Marginal, priors: Widths) -> float:
+    """The most, nats, that one squared amplitude alone promises by its slope and the Fisher information where it is;
+    towards nothing no more than its slope times what is left of it."""
+    unit = priors.width**2
+    u, f = v / unit, np.diag(m.fisher) * unit**2
+    g = m.slope * unit + priors.slope(u)
+    promised = np.where(f > 0, g**2 / (2 * np.maximum(f, 1e-300)), 0.0)
+    return float(np.max(np.where(g > 0, promised, np.minimum(promised, -g * u)), initial=0.0))

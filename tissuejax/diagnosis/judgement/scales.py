@@ -17,6 +17,7 @@ from tissuejax.diagnosis.judgement.marginal import Blocked, Widths
 from tissuejax.estimation.discrepancy import Discrepancy, Done, Part
 
 CLOCKED = ("s", "1/s")  # units of parameters by which a law knows time
+BEFORE = ("zero", "clock")  # families of what was set before a recording began
 SINGULAR = 1e-6  # of the largest: a direction in which constants of the base do less than that is none of its own
 
 
@@ -55,6 +56,7 @@ class Scales:
         values: Mapping[str, float] = MappingProxyType({}),
         slopes: Float[np.ndarray, "M p"] | None = None,
         base: Float[np.ndarray, "M b"] | None = None,
+        faults: Float[np.ndarray, "M r"] | None = None,
     ) -> tuple[Part, ...]:
         """The discrepancy's parts beside a prediction (a long vector), and what the simulation has wrong there.
 
@@ -63,12 +65,15 @@ class Scales:
             slopes: of the prediction, in the constants of the tissue that the set frees: no law errs by what they could
                 do, and what a fault of the rig does is that fault's alone.
             base: slopes in the base's constants; worked out where they are needed and not given.
+            faults: slopes in what faults of the rig are free in the set: a zero or a clock that they can set is theirs.
         """
         here = np.nan_to_num(self.cut.mean(prediction))
         done = self._done(here, bench, keys, values, base) if "effect" in self.families else []
         parts = self.discrepancy.about(here, done) if done else self.discrepancy.about(here)
         if done and slopes is not None:
             parts = tuple(self._across(p, slopes) if p.family == "effect" else p for p in parts)
+        if faults is not None and faults.shape[1]:
+            parts = tuple(self._across(p, faults) if p.family in BEFORE else p for p in parts)
         if bench.numerical is None:
             return parts
         return (*parts, *(self._known(name, self.cut.mean(x)) for name, x in bench.numerical.items()))

@@ -26,10 +26,11 @@ from tissuejax.diagnosis.judgement.marginal import (
     Widths,
     amplitudes,
     smooth,
+    uphill,
 )
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
 from tissuejax.diagnosis.judgement.rest import beyond, numerical, rest, unlike_noise, wobble
-from tissuejax.diagnosis.judgement.scales import Scales, log_prior, squared, with_priors
+from tissuejax.diagnosis.judgement.scales import BEFORE, Scales, log_prior, squared, with_priors
 from tissuejax.diagnosis.judgement.whitening import Whitening
 from tissuejax.diagnosis.refit import Descent, Refit, Resting, anchored, refit
 from tissuejax.estimation.discrepancy import Part
@@ -137,13 +138,14 @@ def weigh(
     at, tolerance, raw = dict(start.at or start.values), course.first, None
     bench = bench.anchored(at) if course.anchor else bench.nearer(at)
     shaped = not bench.costly and any(bench.candidates[k].shapes for k in keys)
-    errs = np.array([f == "effect" for f in scales.families])
+    errs = np.array([f == "effect" or bool(faults) and f in BEFORE for f in scales.families])
     if anew or bench.costly or not np.any(v[errs]):
         parts = scales.about(bench.predict(at), bench, keys, at)
     else:
         parts, raw = _resumed(scales, bench, keys, at, faults)
     for turn in range(course.rounds):
-        # what laws of effects err by lies across the slopes at a fit, and before the first there are none
+        # what laws of effects err by lies across the slopes at a fit, so does what faults set, and before the first
+        # there are none
         known = v if turn or raw is not None else np.where(errs, 0.0, v)
         misfit = Whitening(bench, scales.cut, scales.blocked, parts, known)
         seed = None if raw is None or bench.costly else misfit.whiten_means(raw)
@@ -167,7 +169,9 @@ def weigh(
             break  # a prediction without a slope, or with one beyond all numbers: no density is to be had there
         residual = y - scales.cut.mean(fit.prediction)
         of_base = raw[:, : len(bench.base)]  # they come first
-        parts = scales.about(fit.prediction, bench, keys, fit.values, slopes[:, ~bound & own], of_base)
+        parts = scales.about(
+            fit.prediction, bench, keys, fit.values, slopes[:, ~bound & own], of_base, slopes[:, ~bound & ~own]
+        )
         prior = [priors.get(p) for p in descent.paths]
         weak = np.array([0.0 if p is None else p[1] ** -2 for p in prior])
         offset = np.array([0.0 if p is None else a - p[0] for a, p in zip(x, prior, strict=True)])
@@ -180,7 +184,7 @@ def weigh(
         linear = every.of(free)
         # anew from where all is wide that may be; where predictions are costly fits are few, and both are tried
         begin = frozenset({"wide"} if anew else {"there"}) | ({"there"} if bench.costly else set())
-        v, m = _amplitudes(linear, parts, widths, scales.blocked, v, begin, course.settled)
+        v, m = climb(linear, parts, widths, scales.blocked, v, begin, course)
         anew = False
         value = m.value + 0.5 * int(np.sum(free)) * math.log(2 * math.pi)
         # of these parameters, and not of those that a straight line leads to: the parts move with the prediction
@@ -221,22 +225,30 @@ def _resumed(
     prediction, raw = bench.predict(values), scales.cut.mean(bench.jacobian(values, paths, bench.fitted))
     if not np.isfinite(squared(raw)):
         return scales.about(prediction, bench, keys, at), None
-    return scales.about(prediction, bench, keys, values, raw[:, [p not in faults for p in paths]]), raw
+    own = np.array([p not in faults for p in paths])
+    return scales.about(prediction, bench, keys, values, raw[:, own], faults=raw[:, ~own]), raw
 
 
-def _amplitudes(
-    linear: Linear, parts, widths: Widths, blocked, v, begin: frozenset[str], settled: float
+def climb(
+    linear: Linear, parts, widths: Widths, blocked, v, begin: frozenset[str], course: Course
 ) -> tuple[np.ndarray, Marginal]:
     """`amplitudes` from where all is wide that may be ("wide"), from `v` ("there"), or the better of both.
 
-    A part that is empty, as that of effects is where none acts, stays at nothing.
+    Where the climb from `v` ends on a slope (amplitudes of another fit, far too small beside this one), the other is
+    tried too: along a slope the mass over the amplitudes means nothing. A part that is empty, as that of effects is
+    where none acts, stays at nothing.
     """
-    v, tried = np.where([p.factor is None or np.any(p.factor) for p in parts], v, 0.0), []
-    if "wide" in begin:
-        wide = amplitudes(linear, parts, widths.widest, blocked, v, tolerance=settled)[0]
-        tried.append(amplitudes(linear, parts, widths, blocked, wide))
+    acting = np.array([p.factor is None or bool(np.any(p.factor)) for p in parts])
+
+    def at_widest(start: np.ndarray) -> tuple[np.ndarray, Marginal]:
+        wide = amplitudes(linear, parts, widths.widest, blocked, acting * start, tolerance=course.settled)[0]
+        return amplitudes(linear, parts, widths, blocked, wide)
+
+    tried = [at_widest(v)] if "wide" in begin else []
     if "there" in begin:
-        tried.append(amplitudes(linear, parts, widths, blocked, v))
+        tried.append(amplitudes(linear, parts, widths, blocked, acting * v))
+    if "wide" not in begin and uphill(*tried[0], widths) > course.steep:
+        tried.append(at_widest(widths.width**2))
     return max(tried, key=lambda t: t[1].value + float(np.sum(widths.log_shape(t[0] / widths.width**2))))
 
 
