@@ -76,8 +76,9 @@ def table(answers: list) -> str:
 
 def drawn(listed: list[Entry], answers: list, makers: Makers) -> Figure:
     """Every sample as it was recorded: stress over time where something is held, over stretch or shear elsewhere."""
-    figure = Figure(figsize=(11, 11), layout="constrained", facecolor=PAPER)
-    axes = figure.subplots(4, 3).ravel()
+    rows = -(-len(listed) // 3)
+    figure = Figure(figsize=(11, 2.75 * rows), layout="constrained", facecolor=PAPER)
+    axes = figure.subplots(rows, 3).ravel()
     for ax, entry, answer in zip(axes, listed, answers):
         tidy(ax)
         held = entry.key.endswith(("-relaxation", "-hold"))
