@@ -22,9 +22,9 @@ class Criteria:
         sizes: probability that 0, 1, 2, 3 effects of the catalogue act that the base model lacks. Ground: as often
             something as nothing, and rarely much at once; spread evenly over the names, and over the forms of a name.
         fault: how much rarer a fault of a test machine is than what a law lacks, name for name. Ground: the evidence of
-            85 real samples, no cause read, is likeliest at 0.02 (0.005 to 0.05)
-            (`fits/real-panel/rarity.py`), and what is published was looked through for faults. Of a hand or a robot
-            that presses or cuts no such set is known: there both are alike.
+            85 real samples, no cause read, is likeliest at 0.01 (0.03 and less; `fits/real-panel/rarity.py`), and what
+            is published was looked through for faults. Of a hand or a robot that presses or cuts no such set is known:
+            there both are alike.
         unknown: probability that the discrepancy is far larger than usual in one of its parts: something acts that the
             catalogue doesn't have, beside whatever else acts. Ground: as likely as two effects at once.
         coarse: how many block means with a rest it takes to tell a model that is nearly right from the truth: the
