@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tissuejax.recordings.recording import Channel, Recording, Sample
+from tissuejax.recordings.recording import Sample
 from tissuejax.recordings.specimens import NO_TIME
 
 HERE = Path(__file__).resolve().parent
@@ -19,7 +19,7 @@ sys.path.insert(0, str(HERE.parent / "unseen"))
 
 import unseen_page  # noqa: E402
 from panel_samples import uniaxial  # noqa: E402
-from unseen_page import columns  # noqa: E402
+from unseen_page import columns, untimed  # noqa: E402
 
 WIDE = 30e-3 * 2.65e-3  # m^2: the silicone strip
 FILLED = (40.0, 10e-3 * 4e-3)  # mm, m^2: the silicone with carbon black
@@ -97,13 +97,6 @@ def strips(tests: tuple[str, ...]) -> Sample:
         made.attributes["direction"] = np.array(direction)
         found[test] = made
     return Sample(tests[0], found)
-
-
-def untimed(name: str, kind: str, motion: np.ndarray, stress: np.ndarray, **axes: np.ndarray) -> Recording:
-    """A recording whose samples are counted, motion as stretch or as shear."""
-    time = np.arange(len(motion), dtype=float)
-    inputs = {"time": time, "shear" if kind == "simple-shear" else "stretch": motion}
-    return Recording(name, kind, inputs, {"nominal_stress": Channel(time, stress, "Pa", None)}, axes)
 
 
 def cubes(tests: tuple[str, ...]) -> Sample:

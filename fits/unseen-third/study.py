@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tissuejax.recordings.recording import Channel, Recording, Sample
+from tissuejax.recordings.recording import Sample
 from tissuejax.recordings.specimens import NO_TIME
 
 HERE = Path(__file__).resolve().parent
@@ -20,7 +20,7 @@ sys.path.insert(0, str(HERE.parent / "unseen"))
 
 import unseen_page  # noqa: E402
 from panel_samples import uniaxial  # noqa: E402
-from unseen_page import columns, folder  # noqa: E402
+from unseen_page import columns, folder, untimed  # noqa: E402
 
 FOAM = (29.539e-3, 62.95e-3 * 51.79e-3)  # m, m^2
 GEL_RADIUS = 24e-3  # m: "width", which the source takes for a radius; it scales the stress alone
@@ -93,19 +93,12 @@ def filled(tests: tuple[str, ...]) -> Sample:
     return Sample("filled gelatin", found)
 
 
-def pulled(name: str, stretch: np.ndarray, stress: np.ndarray, direction: np.ndarray) -> Recording:
-    """A pull whose samples are counted."""
-    time = np.arange(len(stretch), dtype=float)
-    channels = {"nominal_stress": Channel(time, stress, "Pa", None)}
-    return Recording(name, "uniaxial", {"time": time, "stretch": stretch}, channels, {"direction": direction})
-
-
 def bladder(tests: tuple[str, ...]) -> Sample:
     """Two strips; kPa assumed."""
     found = {}
     for test in tests:
         stress, strain = columns(f"bladder_two_directions/{test}.csv")
-        found[test] = pulled(test, 1 + strain, 1e3 * stress, DIRECTIONS[test])
+        found[test] = untimed(test, "uniaxial", 1 + strain, 1e3 * stress, direction=DIRECTIONS[test])
     return Sample("bladder", found, notes=NO_TIME)
 
 
@@ -115,7 +108,7 @@ def artery(tests: tuple[str, ...]) -> Sample:
     for test in tests:
         stretch, stress, _ = columns(f"ctl_axial_radial/{test}.csv")
         on = stretch <= WHOLE[test]
-        found[test] = pulled(test, stretch[on], 1e3 * stress[on], DIRECTIONS[test])
+        found[test] = untimed(test, "uniaxial", stretch[on], 1e3 * stress[on], direction=DIRECTIONS[test])
     return Sample("artery", found, notes=NO_TIME)
 
 

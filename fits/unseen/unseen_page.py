@@ -17,7 +17,7 @@ import tissuejax as tj
 from tissuejax.challenge.panel import answered, read_causes, summary
 from tissuejax.errors import InputError
 from tissuejax.progress import for_terminal
-from tissuejax.recordings.recording import Sample
+from tissuejax.recordings.recording import Channel, Recording, Sample
 from tissuejax.report.plot import INK, PAPER, tidy
 from tissuejax.storage import write_between, write_figure, write_json
 
@@ -47,6 +47,13 @@ def columns(path: str) -> np.ndarray:
     """A table's columns as numbers, without its line of names."""
     with (folder() / path).open() as file:
         return np.array([[float(x) for x in row] for row in list(csv.reader(file))[1:] if row]).T
+
+
+def untimed(name: str, kind: str, motion: np.ndarray, stress: np.ndarray, **axes: np.ndarray) -> Recording:
+    """A recording whose samples are counted, motion as stretch or as shear."""
+    time = np.arange(len(motion), dtype=float)
+    inputs = {"time": time, "shear" if kind == "simple-shear" else "stretch": motion}
+    return Recording(name, kind, inputs, {"nominal_stress": Channel(time, stress, "Pa", None)}, axes)
 
 
 def build(entry: Entry, makers: Makers) -> tuple[Sample, tuple[str, ...] | None]:
