@@ -14,8 +14,9 @@ from tissuejax.diagnosis.judgement import weigh as module
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.effort import Course
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, marginal
+from tissuejax.diagnosis.judgement.ranges import beside
 from tissuejax.diagnosis.judgement.scales import Scales
-from tissuejax.diagnosis.judgement.weigh import Start, beside, kurtosis, weigh
+from tissuejax.diagnosis.judgement.weigh import Start, kurtosis, weigh
 from tissuejax.estimation.discrepancy import Part
 
 USUAL = Criteria()

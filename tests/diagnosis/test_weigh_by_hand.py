@@ -13,7 +13,8 @@ from tissuejax.diagnosis.bench import Candidate
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, amplitudes, marginal
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
-from tissuejax.diagnosis.judgement.weigh import Start, _idle, _resting, beside, kurtosis, weigh
+from tissuejax.diagnosis.judgement.ranges import beside
+from tissuejax.diagnosis.judgement.weigh import Start, _idle, _resting, kurtosis, weigh
 from tissuejax.estimation.discrepancy import Part
 
 USUAL = Criteria()

@@ -9,15 +9,16 @@ import pytest
 from scipy.integrate import quad
 from scipy.linalg import sqrtm
 from scipy.stats import kurtosis as fourth
-from scipy.stats import multivariate_normal, truncnorm
+from scipy.stats import multivariate_normal, norm, truncnorm
 from straight_bench import DRIVE, GAIN, MEANS, N, Straight, covariance, half_normal, scales_of, straight
 
 from tissuejax.diagnosis.bench import Candidate, Free
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.effort import Course
 from tissuejax.diagnosis.judgement.marginal import Linear
+from tissuejax.diagnosis.judgement.ranges import on_bounds
 from tissuejax.diagnosis.judgement.scales import Scales
-from tissuejax.diagnosis.judgement.weigh import Start, Weighed, _on_bounds, weigh
+from tissuejax.diagnosis.judgement.weigh import Start, Weighed, weigh
 from tissuejax.diagnosis.refit import Resting
 
 USUAL = Criteria()
@@ -72,6 +73,15 @@ class Dense:
         j = self.jac[:, ~self.bound]
         return j.T @ np.linalg.solve(self.covariance(v), j) + np.diag(self.weak[~self.bound])
 
+    def inside(self, precision: np.ndarray) -> float:
+        """log of what of a normal density of this precision lies between the ends, each parameter by itself."""
+        spread, total = np.sqrt(np.diag(np.linalg.inv(precision))), 0.0
+        for i, s in zip(np.flatnonzero(~self.bound), spread, strict=True):
+            f = self.scales.bench.free[self.paths[i]]
+            low, high = (math.log(f.lower), math.log(f.upper)) if f.log else (f.lower, f.upper)
+            total += math.log(norm.cdf(high, self.x[i], s) - norm.cdf(low, self.x[i], s))
+        return total
+
     def density(self) -> float:
         return float(normal(np.zeros(len(self.left)), self.covariance(self.found.v)).logpdf(self.left))
 
@@ -124,6 +134,7 @@ CASES = [
     ({"shift.x": 0.2, "shift.y": -0.1}, ("shift",), {}),
     ({"noted.x": 0.15}, ("noted",), {}),
     ({"push.k": 3.0}, ("push",), {"push.k": 3.0}),
+    ({"push.k": 0.03}, ("push",), {"push.k": 0.03}),
     ({"push.k": -1.5}, ("push",), {"push.k": 0.5}),
     ({"push.k": -0.5, "shift.x": 0.2, "own.x": 0.1}, ("shift", "push", "own"), {}),
     ({"bend.k": 30.0, "bend.onset": 0.4}, ("bend",), {"bend.k": 30.0, "bend.onset": 0.4}),
@@ -142,6 +153,7 @@ def test_the_evidence_is_density_prior_width_and_mass_at_the_fit(truth, keys, at
     width = 0.5 * np.sum(free) * math.log(2 * math.pi) - 0.5 * np.linalg.slogdet(d.precision(found.v))[1]
     told = 0.5 * float(np.sum((d.weak * d.offset**2)[free]))
     assert e.fit == pytest.approx(d.density() - told, abs=1e-6)
+    width += d.inside(d.precision(found.v))
     assert e.parameters == pytest.approx(d.log_priors() + told + width + d.beside(), abs=1e-6)
     assert e.discrepancy == pytest.approx(d.mass(), abs=1e-4)
     assert e.log_evidence == pytest.approx(e.fit + e.parameters + e.discrepancy, abs=1e-9)
@@ -195,6 +207,7 @@ def test_of_shares_that_take_up_their_whole_the_sum_rests_on_its_end():
     slope = -float(d.weak[largest] * d.offset[largest] - c @ k @ d.left)  # from its end downward
     assert slope > 10 * math.sqrt(curvature)
     width = 1.5 * math.log(2 * math.pi) - 0.5 * np.linalg.slogdet(d.precision(found.v))[1]
+    width += d.inside(d.precision(found.v))
     beside = math.log(quad(lambda x: math.exp(-slope * x - 0.5 * curvature * x**2), 0, 60 / slope)[0])
     own = 0.5 * float(np.sum((d.weak * d.offset**2)[free]))
     assert e.fit == pytest.approx(d.density() - own, rel=1e-8)
@@ -230,15 +243,18 @@ def test_mass_beside_bounds_is_an_integral_each_the_free_ones_integrated_out(fre
         x = np.linspace(0, 60 / max(slope, math.sqrt(curvature)), 400_001)
         whole = np.trapezoid(np.exp(-slope * x - 0.5 * curvature * x**2), x)
         expected += math.log(whole) - 0.5 * weak[i] * offset[i] ** 2
-    found = _on_bounds(scales, (GAIN,), np.array([gain]), every, Resting(np.array(on), side), use, h)
+    ends = np.full(4, np.inf)
+    resting = Resting(np.array(on), side, ends, ends)
+    found = on_bounds(scales.blocked, (GAIN,), np.array([gain]), every, resting, use, h)
     assert found == pytest.approx(expected, abs=1e-5)
 
 
 def test_what_neither_data_nor_prior_say_anything_of_has_no_mass_beside_its_bound():
     scales = scales_of(straight({}))
     every = Linear(np.ones(2 * MEANS), np.zeros((2 * MEANS, 1)), np.zeros(1), np.zeros(1))
-    resting, none = Resting(np.array([True]), np.ones(1)), np.array([False])
-    assert _on_bounds(scales, (GAIN,), np.zeros(1), every, resting, none, np.zeros((0, 0))) == 0.0
+    resting = Resting(np.array([True]), np.ones(1), np.zeros(1), np.full(1, np.inf))
+    none = np.array([False])
+    assert on_bounds(scales.blocked, (GAIN,), np.zeros(1), every, resting, none, np.zeros((0, 0))) == 0.0
 
 
 def test_a_rest_is_in_pascal_where_it_is_measured_by_what_noise_makes_of_the_peak():

@@ -12,7 +12,7 @@ from test_unread import recorded
 
 from tissuejax.diagnosis.bench import Candidate, Free
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear
-from tissuejax.diagnosis.judgement.weigh import _on_bounds
+from tissuejax.diagnosis.judgement.ranges import on_bounds
 from tissuejax.diagnosis.material import MaterialBench
 from tissuejax.diagnosis.misfit import white
 from tissuejax.diagnosis.refit import Resting, refit
@@ -108,7 +108,8 @@ def test_the_evidence_at_the_whole_is_the_mass_inside_it():
     whole = 1.5 * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(information)[1] - 0.5 * left @ left / sigma**2
     inside = whole + norm.logcdf((end - peak[1] - peak[2]) / spread)
 
-    resting = Resting(np.array([False, True, False]), np.array([1.0, -1.0, 1.0]), ((1, np.array([2])),))
+    ends = np.full(3, np.inf)
+    resting = Resting(np.array([False, True, False]), np.array([1.0, -1.0, 1.0]), ends, ends, ((1, np.array([2])),))
     slopes = resting.along(jac)
     free = ~resting.on
     rest = y - end * jac[:, 1]  # the largest stands for the sum
@@ -117,7 +118,7 @@ def test_the_evidence_at_the_whole_is_the_mass_inside_it():
     stub = SimpleNamespace(blocked=Blocked((slice(0, n),), np.full(n, sigma)))
     none = [Part("none", "none", factor=np.zeros((n, 1)))]
     every = Linear(r, slopes, np.zeros(3), np.zeros(3))
-    beside = _on_bounds(stub, none, np.zeros(1), every, resting, free, precision)
+    beside = on_bounds(stub.blocked, none, np.zeros(1), every, resting, free, precision)
     along = np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(precision)[1] - 0.5 * r @ r / sigma**2
     assert along + beside == pytest.approx(inside, abs=1e-9)
     assert inside < whole - 1.0  # it says something

@@ -50,6 +50,7 @@ ROUNDING = {
         "amplitude_mass 0.001": "on the diagonal of a matrix", "_within 0.02": "least error between knots",
         "_within 1.5": "its largest",
     },
+    "judgement/ranges.py": {"DRAWN 500": "points of a cubature, by dimension"},
     "judgement/numbers.py": {"changed 0.99": "the largest share that is tried"},
     "judgement/rest.py": {"wobble 4": "of the variance of a square", "SLICES 200": "of a quadrature"},
     "judgement/reweigh.py": {"of 12": "nats of weight that no number brings to the top", "of 25": "sets at most: cost"},

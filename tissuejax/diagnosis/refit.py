@@ -86,10 +86,13 @@ class Resting:
         on: whether it does, by parameter; side: +1 on the lower end, -1 on the upper one, or to which it is nearer.
         full: parts that take up their whole: the largest, which stands for their sum and rests on its upper end, and
             the others, which move at its cost.
+        below, above: how far it is to either end; of an angle, which goes round, there is none.
     """
 
     on: Bool[np.ndarray, " p"]
     side: Float[np.ndarray, " p"]
+    below: Float[np.ndarray, " p"]
+    above: Float[np.ndarray, " p"]
     full: tuple[tuple[int, np.ndarray], ...] = ()
 
     def along(self, slopes: Float[np.ndarray, "... p"]) -> Float[np.ndarray, "... p"]:
@@ -151,7 +154,8 @@ class Descent(LeastSquares):
                 most = members[np.argmax(x[members])]
                 full.append((int(most), members[members != most]))
                 on[most], side[most] = True, -1.0
-        return Resting(on, side, tuple(full))
+        below, above = (np.where(self.turns, np.inf, room) for room in (x - self.low, self.high - x))
+        return Resting(on, side, below, above, tuple(full))
 
     def natural(self, x: Float[np.ndarray, " p"]) -> dict[str, float]:
         """Values of the free paths at x."""

@@ -8,12 +8,12 @@ from types import MappingProxyType
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.special import log_ndtr
 
 from tissuejax.diagnosis.bench import Bench, Candidate, Free
 from tissuejax.diagnosis.judgement.blocks import Blocks
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.marginal import Blocked, Widths
+from tissuejax.diagnosis.judgement.ranges import between
 from tissuejax.estimation.discrepancy import Discrepancy, Done, Part
 
 CLOCKED = ("s", "1/s")  # units of parameters by which a law knows time
@@ -237,10 +237,7 @@ def log_prior(f: Free, at: float, prior: tuple[float, float]) -> float:
     """Log density of a normal prior inside the bounds of a parameter, in the coordinates of a descent."""
     mean, std = prior
     low, high = (math.log(f.lower), math.log(f.upper)) if f.log else (f.lower, f.upper)
-    a, b = (low - mean) / std, (high - mean) / std
-    if a > 0:
-        a, b = -b, -a
-    inside = log_ndtr(b) + math.log1p(-math.exp(min(log_ndtr(a) - log_ndtr(b), -1e-12)))
+    inside = between((low - mean) / std, (high - mean) / std)
     return -0.5 * ((at - mean) / std) ** 2 - math.log(std * math.sqrt(2 * math.pi)) - inside
 
 

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import erfcx
 
 from tissuejax.diagnosis.bench import Bench, Candidate
 from tissuejax.diagnosis.judgement.criteria import Criteria
@@ -25,14 +24,14 @@ from tissuejax.diagnosis.judgement.marginal import (
     Marginal,
     Widths,
     amplitudes,
-    smooth,
     uphill,
 )
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
+from tissuejax.diagnosis.judgement.ranges import on_bounds, within
 from tissuejax.diagnosis.judgement.rest import beyond, numerical, rest, unlike_noise, wobble
 from tissuejax.diagnosis.judgement.scales import BEFORE, Scales, log_prior, squared, with_priors
 from tissuejax.diagnosis.judgement.whitening import Whitening
-from tissuejax.diagnosis.refit import Descent, Refit, Resting, anchored, refit
+from tissuejax.diagnosis.refit import Descent, Refit, anchored, refit
 from tissuejax.estimation.discrepancy import Part
 
 FELT = 1e-6  # of the peak: what is no rounding, by its slope
@@ -95,12 +94,6 @@ class Round:
     bench: Bench
     felt: Mapping[str, float]
     linear: Linear
-
-
-def beside(slope: float, curvature: float) -> float:
-    """Log of int_0^inf exp(-slope x - curvature x^2 / 2) dx: what a parameter on its bound has beside it."""
-    h = max(curvature, 1e-300)
-    return 0.5 * math.log(math.pi / (2 * h)) + math.log(erfcx(max(slope, 0.0) / math.sqrt(2 * h)))
 
 
 @dataclass(frozen=True)
@@ -196,7 +189,8 @@ def weigh(
             if q is not None
         )
         # what rests on a bound was left out of the integral: its own factor, and its prior's square, follow
-        held = _on_bounds(scales, parts, v, every, resting, free, m.precision)
+        held = on_bounds(scales.blocked, parts, v, every, resting, free, m.precision)
+        held += within(resting, free, m.precision)
         occam = amplitude_mass(linear, parts, widths, scales.blocked, v, m)
         total = value + held + occam
         if best is None or total > best.total + 1e-6:
@@ -250,40 +244,6 @@ def climb(
     if "wide" not in begin and uphill(*tried[0], widths) > course.steep:
         tried.append(at_widest(widths.width**2))
     return max(tried, key=lambda t: t[1].value + float(np.sum(widths.log_shape(t[0] / widths.width**2))))
-
-
-def _on_bounds(scales: Scales, parts, v, every: Linear, resting: Resting, free, precision) -> float:
-    """Log mass beside the bounds of what rests on them, of `every` parameter of a set.
-
-    Each with the `free` parameters, of that precision, integrated out: what they take up of its curvature is no
-    information on it. Of two on their bounds the other is held.
-    """
-    if not resting.on.any():
-        return 0.0
-    inverse = [np.linalg.inv(b) for b in scales.blocked.within(parts, v)]
-    u = smooth(parts, v)
-
-    def solve(a: np.ndarray) -> np.ndarray:
-        return np.concatenate([i @ a[r] for i, r in zip(inverse, scales.blocked.rows, strict=True)])
-
-    g = solve(u)
-    inner = np.eye(u.shape[1]) + u.T @ g
-
-    def whole(a: np.ndarray) -> np.ndarray:
-        light = solve(a)
-        return light - g @ np.linalg.solve(inner, u.T @ light)
-
-    jac, weak, offset = every.jacobian, every.weak, every.offset
-    w, total = whole(every.residual), 0.0
-    others = whole(jac[:, free])
-    for i in np.flatnonzero(resting.on):
-        slope = float(resting.side[i]) * float(weak[i] * offset[i] - jac[:, i] @ w)
-        shared = jac[:, i] @ others
-        taken = shared @ np.linalg.solve(precision, shared) if len(shared) else 0.0
-        curvature = float(jac[:, i] @ whole(jac[:, i]) + weak[i] - taken)
-        if curvature > 0:
-            total += beside(slope, curvature) - 0.5 * float(weak[i] * offset[i] ** 2)
-    return total
 
 
 def _impossible(scales: Scales, keys: Sequence[str]) -> Weighed:
