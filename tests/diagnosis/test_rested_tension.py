@@ -44,10 +44,10 @@ def test_relaxation_and_slack_are_found_together(seed):
     left = {k: told[k]["r1"]["nominal_stress"]["rmse"] ** 2 - NOISE**2 for k in ("before", "after")}
     assert abs(told["explained"]["fitted"] - (1 - max(left["after"], 0) / left["before"])) < 0.01  # 0 when nothing is
     assert told["explained"]["held_out"] is None  # held out, and the fitted recordings' share was that of those
-    # how much of the stress goes within the first samples one ramp can't tell, what is left in the end it can
     values = told["base_parameters"]["energy.mu"]
     low, high = values["after_interval"]
     assert low < MU < high
+    assert values["after"] == pytest.approx(MU, rel=0.05)
     relaxing = next(e for e in told["effects"] if e["name"] == "viscoelasticity")["parameters"]
     gone = sum(p["value"] for path, p in relaxing.items() if path.split(".")[-1].startswith("g"))
     assert values["after"] * (1 - gone) == pytest.approx(MU * (1 - SHARE), rel=0.05)
