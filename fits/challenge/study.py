@@ -46,7 +46,15 @@ NEWEST = {
         "material-twenty-third",
         "material-twenty-fourth",
     ),
-    "beside a rest": ("rest-seventh", "rest-eighth", "rest-ninth", "rest-tenth", "rest-eleventh", "rest-twelfth"),
+    "beside a rest": (
+        "rest-seventh",
+        "rest-eighth",
+        "rest-ninth",
+        "rest-tenth",
+        "rest-eleventh",
+        "rest-twelfth",
+        "rest-thirteenth",
+    ),
     "probings": ("probing-seventh",),
     "probings beside a rest": ("probing-rest",),
 }  # the newest of each kind, of the judgements of their day
