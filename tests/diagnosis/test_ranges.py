@@ -144,11 +144,11 @@ def test_two_shares_that_do_the_same_cost_no_less_than_they_should():
     nothing. To a twentieth: a fit stops short of the best split by what it no longer gains."""
     wave = 30.0 * np.sin(9 * DRIVE)
     frees = {"more.g": Free(0.0, 1.0, 0.2), "more.h": Free(0.0, 1.0, 0.2)}
-    bench = bounded({"more.g": 0.3, "more.h": 0.1}, {"more.g": wave, "more.h": wave * (1 + 0.01 * DRIVE)}, frees)
+    bench = bounded({"more.g": 0.15, "more.h": 0.05}, {"more.g": wave, "more.h": wave * (1 + 0.001 * DRIVE)}, frees)
     scales = scales_of(bench, NOTHING)
     width = usual(bench, scales)
     value = integrand(bench, scales, width)
-    splits, sums = np.linspace(-3.0, 3.0, 6001), np.linspace(0.39, 0.41, 801)[:, None]
+    splits, sums = np.linspace(-3.0, 3.0, 6001), np.linspace(0.19, 0.21, 801)[:, None]
     logs = value(0.5 * (sums + splits), 0.5 * (sums - splits))
     top, cell = np.max(logs), 0.5 * (splits[1] - splits[0]) * float(sums[1, 0] - sums[0, 0])
     inside = np.abs(splits) <= sums
