@@ -108,6 +108,7 @@ def test_protocols_stay_near_what_was_done(pulled):
         assert r.attributes["start"] >= 600
 
 
+@pytest.mark.slow
 def test_a_recording_is_proposed_where_an_answer_leaves_named_accounts_open():
     """Three pulls of one rate, 4 % of the stress relaxes: little speaks for relaxation against a set that stays."""
     specimen = Specimen(

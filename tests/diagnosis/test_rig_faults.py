@@ -56,7 +56,9 @@ def relaxed(time, path, g=0.3, tau=1.5):
 @pytest.mark.parametrize(
     ("recorded", "name", "path", "value"),
     [
-        (lambda t, path: elastic(path(t - 0.12)), "clock-lag", "effects.clock-lag.lag", 0.12),
+        pytest.param(
+            lambda t, path: elastic(path(t - 0.12)), "clock-lag", "effects.clock-lag.lag", 0.12, marks=pytest.mark.slow
+        ),
         (
             lambda t, path: elastic(path(t)) * (1 + 0.9 * AREA * np.abs(elastic(path(t)))),
             "load-cell-bend",
