@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 import tissuejax as tj
+from tissuejax.diagnosis.diagnose import asked_of
 from tissuejax.diagnosis.judgement.blocks import blocks, series
 from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.scales import BEFORE, scaled
+from tissuejax.diagnosis.judgement.weigh import Start, weigh
 from tissuejax.diagnosis.material import MaterialBench, strain_states
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.energies.neo_hookean import NeoHookean
@@ -84,6 +86,20 @@ def test_a_zero_that_a_fault_of_the_set_can_move_is_that_faults():
     assert np.sum(across, axis=1) == pytest.approx(np.zeros(len(alike)), abs=1e-9 * np.max(before))
     apart = before[:, 0] - before[:, 1]
     assert across[:, 0] - across[:, 1] == pytest.approx(apart, rel=1e-2, abs=1e-2 * np.max(apart))
+
+
+def test_beside_a_gap_zeros_lie_across_the_gap_and_not_across_the_modulus():
+    """The modulus is no fault of a rig. A common zero has the slope -d/dl mu (l - l^-2), hardly that of the modulus."""
+    bench = asked_of(pulled((0.0, 0.0), gap=0.02), "neo-hookean", effects=("slack",)).whole
+    cut = blocks(bench)
+    of = discrepancy(series(bench, cut, strain_states(bench)), cut.spread(bench.sigma), at_once=True)
+    scales = scaled(bench, cut, of, bench.y, {p: bench.start[p] for p in bench.base})
+    weighed = weigh(scales, ("slack",), Start(dict(bench.start)), Criteria())
+    zeros, values = named(weighed.parts, "zero"), weighed.refit.values
+    gap, modulus = cut.mean(bench.jacobian(values, ["effects.slack.gap", "energy.mu"], bench.fitted)).T
+    across = np.linalg.norm(zeros.T @ gap) / np.linalg.norm(gap)
+    along = np.linalg.norm(zeros.T @ modulus) / np.linalg.norm(modulus)
+    assert across < 1e-9 * along
 
 
 def names(found: Diagnosis) -> list[str]:
