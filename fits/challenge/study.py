@@ -27,7 +27,7 @@ CURRENT = {
                  "material-twenty-fourth"),
     "probing": ("probing", "probing-strong", "probing-strong-second", "probing-pairs", "probing-second",
                 "probing-strong-third", "probing-third", "probing-fourth", "probing-fifth", "probing-sixth",
-                "probing-seventh"),
+                "probing-seventh", "probing-eighth"),
 }  # fmt: skip
 
 
@@ -55,7 +55,7 @@ NEWEST = {
         "rest-twelfth",
         "rest-thirteenth",
     ),
-    "probings": ("probing-seventh",),
+    "probings": ("probing-seventh", "probing-eighth"),
     "probings beside a rest": ("probing-rest",),
 }  # the newest of each kind, of the judgements of their day
 

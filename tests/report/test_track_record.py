@@ -31,4 +31,5 @@ def test_the_record_is_that_of_the_graded_sets(experiment):
 def test_too_few_answers_say_nothing():
     assert sentence("probing", "found-in-part") == ""
     assert sentence("cutting", "found") == ""
-    assert "14 of 16 answers of this kind were true" in sentence("probing", "found")
+    held = RECORD["probing"]["found"]
+    assert f"{held.true} of {held.of} answers of this kind were true" in sentence("probing", "found")
