@@ -158,6 +158,7 @@ def test_nonlinear_viscosity_takes_the_corners_of_its_load(tau, m):
     np.testing.assert_allclose(found, expected, atol=2e-9 * np.abs(expected).max())
 
 
+@pytest.mark.slow
 def test_nonlinear_viscosity_is_differentiated_in_both_modes():
     """A plain prediction runs another loop than one that is differentiated: the same values, and their slopes."""
     time = np.linspace(0, 15, 16)

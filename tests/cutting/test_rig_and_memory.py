@@ -78,6 +78,7 @@ def slice_():
     return predictor(m, made, by="simulation", settings=CuttingSettings(h=1e-3), start=KNOWN), x
 
 
+@pytest.mark.slow
 def test_a_simulated_blade_stands_behind_and_its_work_is_its_own(slice_):
     """Means over an element, as ripples come at other times where the blade is elsewhere."""
     p, x = slice_

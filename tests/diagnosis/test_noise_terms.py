@@ -99,7 +99,8 @@ def test_nor_is_it_where_its_level_was_not_recorded():
     assert answer.as_dict()["rest"]["share_of_peak"] < 0.004
 
 
-@pytest.mark.parametrize(("kind", "frequency"), [(filtered, 0.7), pytest.param(carried, 3.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "frequency"), [(filtered, 0.7), (carried, 3.0)])
 def test_noise_is_read_again_beside_the_mismatch_that_hid_it(kind, frequency):
     sample = recorded(hummed(kind, frequency))
     once = diagnose(sample, "neo-hookean", effects=TRIED, effort=replace(QUICK, readings=0))

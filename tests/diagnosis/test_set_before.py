@@ -134,6 +134,6 @@ def swung(late: float) -> Sample:
     return Sample("swung", recordings)
 
 
-@pytest.mark.parametrize(("late", "named"), [(0.7, []), (3.0, ["clock-lag"])])
+@pytest.mark.parametrize(("late", "named"), [pytest.param(0.7, [], marks=pytest.mark.slow), (3.0, ["clock-lag"])])
 def test_a_force_that_is_less_than_a_sample_late_is_nothing_and_three_samples_late_a_lag(late, named):
     assert names(tj.diagnose(swung(late), "neo-hookean")) == named

@@ -54,6 +54,7 @@ def test_near_the_rim_the_core_is_narrower_on_that_side_alone():
     assert sizes[:3].sum() + sizes[3:8].sum() == pytest.approx(7e-3, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_error_at_held_out_places_is_measured_and_small():
     found = made.small()
     error = found.record["error"]
