@@ -25,7 +25,8 @@ types: $(STAMP)
 
 # A thread a worker: small matrices on two threads each, twice over, wait for one another. A file stays with one
 # worker, which compiles what its tests share once. Most of the time is compiling: tests run on code that XLA makes in
-# half the time and that runs half as fast; `make test QUICK=` and `make slow` compile as users do.
+# half the time and that runs half as fast, in some folders (tests/conftest.py) with no optimization at all;
+# `make test QUICK=` and `make slow` compile as users do.
 QUICK ?= --xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=2
 
 # Tests of the lower floors, whose shapes and types are checked while they run (tests/conftest.py).

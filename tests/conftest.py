@@ -43,6 +43,10 @@ LONGEST = (
 SHARED = Path(os.environ.get("TISSUEJAX_SHARED", Path(__file__).resolve().parents[2] / "shared"))
 
 
+# Folders whose tests compile long and run briefly, and the flag by which `make test` asks for a quick run.
+BRIEF, QUICK = ("tled", "probing", "cutting", "surrogate", "contracts", "play"), "--xla_backend_optimization_level"
+
+
 def pytest_configure(config):
     """What one worker, or a program that a test starts, has compiled in this run the others need not compile again."""
     if PROGRAMS in os.environ or hasattr(config, "workerinput"):
@@ -69,6 +73,15 @@ def pytest_collection_finish():
 def pytest_unconfigure(config):
     if hasattr(config, "programs"):
         shutil.rmtree(config.programs, ignore_errors=True)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_optimization(request):
+    """In a quick run programs of tests that run briefly are compiled without any."""
+    brief = request.path.parent.name in BRIEF and QUICK in os.environ.get("XLA_FLAGS", "")
+    jax.config.update("jax_disable_most_optimizations", brief)
+    yield
+    jax.config.update("jax_disable_most_optimizations", False)
 
 
 def outside(*parts: str) -> Path:
