@@ -50,6 +50,16 @@ def test_where_time_is_strain_or_the_law_knows_no_time_it_is_smooth_in_strain_al
     np.testing.assert_allclose(share, np.broadcast_to(share[0], share.shape), rtol=1e-9)
 
 
+def test_what_acts_within_some_samples_errs_in_each_entry_by_itself():
+    of, done = two(paced=True)
+    done[::2] = 0.0
+    (part,) = (p for p in of.about(300 * np.tile(STRAIN, 2), [Done(done, True, brief=True)]) if p.family == "effect")
+    np.testing.assert_array_equal(part.factor @ part.factor.T, np.diag(done**2))
+    assert part.factor.shape == (80, np.count_nonzero(done))
+    (idle,) = (p for p in of.about(300 * np.tile(STRAIN, 2), [Done(0 * done, True, brief=True)]) if p.name == "effects")
+    assert not np.any(idle.factor)
+
+
 def test_where_nothing_acts_it_changes_neither_the_evidence_nor_its_mass(rng):
     of, _ = two(paced=True)
     stress = 300 * np.tile(STRAIN, 2)

@@ -61,6 +61,7 @@ class Candidate:
         corners: by path, sizes of an amplitude at which what it does is scored as a whole (`effects.form.Form`).
         placed: of probings: settings of the shapes by where the probe went deepest (`effects.form.Form`).
         heard: of probings: the channel whose periodogram `spectral` reads.
+        brief: of material tests: it acts within some samples, so that means of them don't tell what it does.
         lacking: by property of the protocol, families that it widens too where the protocol lacks that.
     """
 
@@ -78,6 +79,7 @@ class Candidate:
     corners: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     placed: Placed | None = None
     heard: str = ""
+    brief: bool = False
     lacking: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property

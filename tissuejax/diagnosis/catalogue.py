@@ -75,6 +75,7 @@ class Entry(Offer):
                     corners={f"{prefix}.{name}": sizes for name, sizes in form.corners.items()},
                     placed=form.placed,
                     heard=form.heard,
+                    brief=self.effect.brief,
                     widens=dict(form.widens),
                     lacking=dict(form.lacking),
                 )

@@ -6,7 +6,7 @@ two to a block, and more where the specimen is moved far in one; a prediction is
 stretches. What is lacking then is added where a fit begins and where it comes to rest (`Bench.anchored`): evidence is
 that of the whole series, slopes are those of the pieces.
 
-A hum is predicted in full: it turns within a piece.
+A hum is predicted in full, for it turns within a piece, and so is what acts within some samples (`Effect.brief`).
 """
 
 import copy
@@ -47,11 +47,11 @@ class ThinnedBench(MaterialBench):
         thin = {n: averaged(whole._tests[n], p, self._counts[n]) for n, p in pieces.items()}
         to = lengths([len(p) for p in pieces.values()])
         self._lay({n: lengthened(t, k) for (n, t), k in zip(thin.items(), to, strict=True)})
-        spectral = (c for c in self.candidates.values() if c.spectral is not None)
-        self._turning = frozenset(p for c in spectral for p in c.paths)
+        within = (c for c in self.candidates.values() if c.spectral is not None or c.brief)
+        self._within = frozenset(p for c in within for p in c.paths)
 
     def _in_full(self, values: Mapping[str, float]) -> bool:
-        return not self._turning.isdisjoint(values)
+        return not self._within.isdisjoint(values)
 
     def predict(self, values: Mapping[str, float], recordings: Sequence[str] | None = None) -> Float[np.ndarray, " N"]:
         """See `Bench.predict`."""

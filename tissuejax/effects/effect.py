@@ -59,6 +59,8 @@ class Effect(eqx.Module):
         history: of material tests: whether its stress has a past, which a compiled program holds or not.
         added: whether it is added to what is reported last, a function of time alone, so that its derivative needs
             nothing else, and in a probing no simulation.
+        brief: of material tests: whether it acts within some samples, so that a search predicts it in full and not of
+            means (`diagnosis.thinned`).
         group: of probings: effects of one group are compiled together ("rig": in every program; "" alone).
         displaces: of probings: parameters that only move the probe towards the tissue (`diagnosis.probing_free`).
         sensed: of probings: parameters that only change what sensors report, of an effect that changes more.
@@ -94,6 +96,7 @@ class Effect(eqx.Module):
     price: ClassVar[Price] = Price()
     history: ClassVar[bool] = False
     added: ClassVar[bool] = False
+    brief: ClassVar[bool] = False
     group: ClassVar[str] = ""
     displaces: ClassVar[tuple[str, ...]] = ()
     sensed: ClassVar[tuple[str, ...]] = ()

@@ -53,6 +53,18 @@ def dying(time: Float[Array, " n"], rate: Float[Array, ""]) -> Float[Array, " n"
     return jnp.where(going, -jnp.expm1(-rate * time) / jnp.where(going, rate, 1.0), time)
 
 
+def acceleration(time: Float[Array, " n"], x: Float[Array, "n ..."]) -> Float[Array, "n ..."]:
+    """Second derivative of x by time at every sample, of the parabola through it and its neighbours; 0 at both ends
+    and where times repeat."""
+    step = jnp.diff(time)
+    inside = (step[1:] > 0) & (step[:-1] > 0)
+    shaped = (slice(None), *(None,) * (x.ndim - 1))
+    rate = jnp.diff(x, axis=0) / jnp.where(step > 0, step, 1.0)[shaped]
+    span = jnp.where(inside, 0.5 * (step[1:] + step[:-1]), 1.0)
+    bent = jnp.where(inside[shaped], jnp.diff(rate, axis=0) / span[shaped], 0.0)
+    return jnp.pad(bent, [(1, 1)] + [(0, 0)] * (x.ndim - 1))
+
+
 def delayed(time: Float[Array, " n"], x: Float[Array, " n"], lag: Float[Array, ""]) -> Float[Array, " n"]:
     """x as it was `lag` before every sample; at rest before the first and after the last one.
 

@@ -125,10 +125,17 @@ def _passed(time: Float[np.ndarray, " n"], begun: float) -> Float[np.ndarray, " 
 
 @dataclass(frozen=True)
 class Done:
-    """What an effect does that the base model could not do in its place, Pa; whether its law knows times or rates."""
+    """What an effect does that the base model could not do in its place, Pa.
+
+    Attributes:
+        timed: whether its law knows times or rates.
+        brief: whether it acts within some samples, so that what it errs by is no function of strain or time: each
+            entry errs by itself.
+    """
 
     change: Float[np.ndarray, " N"]
     timed: bool
+    brief: bool = False
 
 
 @dataclass(frozen=True)
@@ -181,7 +188,7 @@ class Discrepancy:
             for alike, a, b in zip(self.fading, edges, edges[1:], strict=False)
         )
         changing = (Part("waning gain", "slow", within=waning),) if waning else ()
-        errs = [d.change[:, None] * (self.in_time if d.timed else self.nearly) for d in done]
+        errs = [_errs(d, self.in_time if d.timed else self.nearly) for d in done]
         errs = errs or [np.zeros((len(prediction), 1))]
         effects = Part("effects", "effect", np.concatenate(errs, axis=1))
         disturbed = None if self.timed is None else Disturbed(prediction, self.timed)
@@ -197,6 +204,13 @@ class Discrepancy:
         if self.sampled is None:
             return (zero,)
         return zero, Part("clock", "clock", (of.rate * self.sampled)[:, None] * self.belongs)
+
+
+def _errs(done: Done, smooth: Float[np.ndarray, "N e"]) -> Float[np.ndarray, "N _"]:
+    """Factors of what an effect's law errs by, about what it does."""
+    if done.brief and np.any(done.change):
+        return np.diag(done.change)[:, done.change != 0]
+    return done.change[:, None] * smooth
 
 
 def discrepancy(

@@ -92,13 +92,14 @@ class Scales:
         A relaxation that is long over at the first sample only makes the base softer: it does nothing, and has nothing
         wrong with it, however much of the stress is gone.
 
-        A fault of the rig is exactly what it is called: an offset, a lag, a hum of one frequency. A law without a time
-        or a rate errs by no function of time: that is for another effect to explain.
+        A fault of the rig is exactly what it is called: an offset, a lag, a hum of one frequency; but what acts within
+        some samples is no better known than what those say of it. A law without a time or a rate errs by no function
+        of time: that is for another effect to explain.
         """
         out, base = [], None
         for candidate in (bench.candidates[k] for k in keys):
             neutral = {a: bench.start[a] for a in candidate.amplitudes if a in values}
-            if neutral and not candidate.rig:
+            if neutral and (candidate.brief or not candidate.rig):
                 without = self.cut.mean(bench.predict({**values, **neutral}))
                 timed = any(bench.free[p].unit in CLOCKED for p in candidate.paths)
                 change = np.nan_to_num(here - without)
@@ -107,7 +108,9 @@ class Scales:
                         self.cut.mean(bench.jacobian(values, bench.base, bench.fitted)) if slopes is None else slopes
                     )
                     base = _span(np.nan_to_num(known))  # an orthonormal basis of what the base's constants can do
-                out.append(Done(change - base @ (base.T @ change), timed))
+                if not candidate.brief:
+                    change = change - base @ (base.T @ change)
+                out.append(Done(change, timed, candidate.brief))
         return out
 
     def _across(self, part: Part, slopes: Float[np.ndarray, "M p"]) -> Part:
