@@ -13,6 +13,8 @@ import trimesh
 from tissuejax import verbs
 from tissuejax.cache import source
 from tissuejax.cli import _warned, commands, listed, main
+from tissuejax.commands import diagnose as diagnose_command
+from tissuejax.errors import InputError
 
 ROOT = Path(__file__).parents[1]
 ELASTIC = str(ROOT / "data" / "demo" / "elastic.h5")
@@ -209,6 +211,19 @@ def test_the_demo_fits_fails_to_fit_and_finds_out_why(capsys, tmp_path, monkeypa
     assert found["after"]["holdout"]["nominal_stress"]["chi2_per_sample"] < 1.2
     for name in ("elastic", "relaxing", "diagnosis"):
         assert (tmp_path / name / "report.html").stat().st_size > 50_000
+
+
+@pytest.mark.parametrize(("typed", "odds"), [((), 0.1), (("--rig", "unchecked"), 1.0), (("--rig", "verified"), 0.01)])
+def test_what_is_typed_of_a_machine_is_how_it_is_judged(capsys, monkeypatch, typed, odds):
+    asked = {}
+
+    def stopped(*given, **options):
+        asked.update(options)
+        raise InputError("seen enough")
+
+    monkeypatch.setattr(diagnose_command, "diagnose", stopped)
+    assert main(["diagnose", ELASTIC, *YEOH, *typed]) == 2
+    assert asked["criteria"].fault == odds
 
 
 def test_help_and_the_bare_package_bring_no_jax_along():

@@ -250,3 +250,9 @@ def test_a_slip_of_density_or_gravity_is_remarked(old, new, words, lab, capsys):
     assert ("note: density" in out or "note: gravity" in out) == bool(words)
     assert main(["inspect", str(lab / "probe.h5")]) == 0
     assert words.removeprefix("note: ") in capsys.readouterr().out
+
+
+def test_a_word_on_a_test_machine_is_refused_where_there_is_none(lab, capsys):
+    main(["import", str(lab / "probe.toml")])
+    assert main(["diagnose", str(lab / "probe.h5"), "-e", "neo-hookean", "--rig", "unchecked"]) == 2
+    assert "--rig unchecked: in a recording of probing" in capsys.readouterr().err

@@ -10,9 +10,10 @@ import equinox as eqx
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.outputs import add_out, effects_of, folder
 from tissuejax.diagnosis.diagnose import diagnose
+from tissuejax.diagnosis.judgement.criteria import RIGS, Criteria
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.effects.catalogue import effect, effects
-from tissuejax.errors import unknown
+from tissuejax.errors import InputError, unknown
 from tissuejax.experiments.catalogue import experiment
 from tissuejax.progress import for_terminal
 from tissuejax.recordings.files import read
@@ -44,6 +45,7 @@ shown come from a fit to the others, with nothing fitted to those held out.
   tissuejax diagnose muscle.toml --energy neo-hookean --holdout slow --holdout fast
   tissuejax diagnose liver.h5 --energy reduced-polynomial-2 --with gravity --with viscoelasticity.g1=0.3
   tissuejax diagnose rubber.toml --energy ogden-3 --ogden-form mu/alpha --effect viscoelasticity --effect softening
+  tissuejax diagnose skin.toml --energy neo-hookean --rig unchecked
 
 What is written into --out: result.json (every number), report.html (one page to read and keep), remainder.json (what is
 still left, as smooth functions of drive, rate, time and place), evidence.json (every set weighed), the figures (PNG;
@@ -80,11 +82,24 @@ stopped goes on where it was when the same command is given again.
             "(repeat); held-out recordings choose the effects too",
         )
         parser.add_argument("--effect", action="append", metavar="NAME", help="try only these effects (repeat)")
+        parser.add_argument(
+            "--rig",
+            choices=RIGS,
+            default="usual",
+            help="of material tests, what is known of the test machine: verified (compliance, clocks and zeros were "
+            "measured: a fault is held for 100 times less likely than what a law lacks), usual (10 times), unchecked "
+            "(as likely)",
+        )
         add_out(parser, "out/SAMPLE-diagnosis-ENERGY")
 
     def run(self, given: argparse.Namespace) -> Reply:
         """Read, diagnose, write."""
         sample = _only(read(given.file), given.only, [*(given.holdout or []), *given.unread])
+        if given.rig != "usual" and (kinds := _kinds(sample) - {"homogeneous"}):
+            raise InputError(
+                f"--rig {given.rig}: in a recording of {' and '.join(sorted(kinds))} a fault of the rig is as likely "
+                "as anything else beforehand; leave it out"
+            )
         out = folder(given.out, "diagnosis", sample.name, [given.energy], given.force)
         found = diagnose(
             sample,
@@ -96,6 +111,7 @@ stopped goes on where it was when the same command is given again.
             keep=out / "runs",
             known=given.known,
             unread=given.unread,
+            criteria=Criteria.of_rig(given.rig),
         )
         again = _fit_with(found, sample, given)
         reply = diagnosed(found, write_diagnosis(found, out, again=again))
@@ -113,6 +129,10 @@ def _only(sample: Sample, only: list[str], holdout: list[str] | None) -> Sample:
     return eqx.tree_at(lambda s: s.recordings, sample, kept, is_leaf=lambda x: isinstance(x, dict))
 
 
+def _kinds(sample: Sample) -> set[str]:
+    return {experiment(r.experiment).kind for r in sample.recordings.values()}
+
+
 def _fit_with(found: Diagnosis, sample: Sample, given: argparse.Namespace) -> str:
     """The command that fits with what was named; "" where nothing was, or where `fit` can't be told of it."""
     options: list[str] = []
@@ -128,8 +148,7 @@ def _fit_with(found: Diagnosis, sample: Sample, given: argparse.Namespace) -> st
         for p, v in values.items():
             if known[p].frozen and v != known[p].default:
                 options += ["--fix", f"effects.{name}.{p}={v:.6g}"]
-    kinds = {experiment(r.experiment).kind for r in sample.recordings.values()}
-    if not options or "cutting" in kinds or given.known:  # what is known has no option of `fit`
+    if not options or "cutting" in _kinds(sample) or given.known:  # what is known has no option of `fit`
         return ""
     options += [x for name in given.only for x in ("--only", name)]
     held = [x for name in found.as_dict()["held_out"] for x in ("--holdout", name)]

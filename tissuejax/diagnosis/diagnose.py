@@ -72,7 +72,8 @@ def diagnose(
             (`Diagnosis.repaired`); what is given is kept, the rest of such an effect is fitted with the base.
         unread: of material tests, recordings that take no part in anything: neither fitted, nor in the noise, nor in
             the choice. They are predicted when all is done (`Diagnosis.unread`).
-        criteria: the numbers that make a verdict; the usual ones by default.
+        criteria: the numbers that make a verdict; the usual ones by default. `Criteria.of_rig("unchecked")` says that
+            nobody has looked at the test machine.
 
     Raises:
         InputError: a file that can't be read, an unknown recording or effect, fewer samples than parameters.

@@ -139,7 +139,8 @@ def _were_faults_common(d: Diagnosis) -> list[str]:
     named = f": {joined(list(other.names))}" if other.names else ""
     return [
         f"Beforehand a fault of the test machine was held for {1 / criteria.fault:.0f} times less likely than what a "
-        f"tissue does. Were it as likely, the answer would be {other.kind.value}{named} ({chance(other.confidence)})."
+        f"tissue does. Were it as likely, the answer would be {other.kind.value}{named} ({chance(other.confidence)}); "
+        "say so (--rig unchecked) where nobody has looked at the machine."
     ]
 
 

@@ -9,9 +9,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tissuejax.diagnosis.judgement.particular import MEANS, SHOWN, SIMULATED, STROKES, Means, Shown, Simulated, Strokes
+from tissuejax.errors import unknown
 from tissuejax.estimation.correlation import MISSTATED
 from tissuejax.estimation.level import OF_NOTE
 from tissuejax.estimation.smoothness import USUAL, Smoothness
+
+# By what is known of a test machine, how likely a fault of it is beside what a law lacks, name for name: how its load
+# train gives, when its channels read and where they count from was measured (as of published recordings, see
+# `Criteria.fault`); nothing is said; nothing of that was ever looked at, and a fault is as likely as anything else.
+RIGS = {"verified": 0.01, "usual": 0.1, "unchecked": 1.0}
 
 
 @dataclass(frozen=True)
@@ -21,7 +27,8 @@ class Criteria:
     Attributes:
         sizes: probability that 0, 1, 2, 3 effects of the catalogue act that the base model lacks. Ground: as often
             something as nothing, and rarely much at once; spread evenly over the names, and over the forms of a name.
-        fault: how much rarer a fault of a test machine is than what a law lacks, name for name. Ground: the evidence of
+        fault: how much rarer a fault of a test machine is than what a law lacks, name for name, unless a user says what
+            is known of the machine (`Criteria.of_rig`). Ground: the evidence of
             85 real samples, no cause read, is likeliest at 0.01 (0.03 and less; `fits/real-panel/rarity.py`), and what
             is published was looked through for faults. Of a hand or a robot that presses or cuts no such set is known:
             there both are alike.
@@ -90,7 +97,7 @@ class Criteria:
     """
 
     sizes: tuple[float, ...] = (0.4, 0.4, 0.15, 0.05)
-    fault: float = 0.1
+    fault: float = RIGS["usual"]
     unknown: float = 0.1
     coarse: float = 200.0
     shares: Mapping[str, float] = field(
@@ -124,6 +131,17 @@ class Criteria:
     means: Means = MEANS
     simulated: Simulated = SIMULATED
     strokes: Strokes = STROKES
+
+    @classmethod
+    def of_rig(cls, known: str) -> "Criteria":
+        """The usual criteria beside what is `known` of the test machine, a key of `RIGS`.
+
+        Raises:
+            InputError: another word.
+        """
+        if known not in RIGS:
+            raise unknown("knowledge of a rig", known, RIGS)
+        return cls(fault=RIGS[known])
 
     def usual(self, rig: bool) -> float:
         """How much of the stress an effect changes, of the rig or of the tissue."""
