@@ -14,7 +14,6 @@ from tissuejax.diagnosis.judgement.evidence import read_evidence, write_evidence
 from tissuejax.diagnosis.judgement.judge import Beforehand, Kind, judge
 from tissuejax.diagnosis.judgement.marginal import Blocked, Linear, Widths, amplitudes, factored, marginal
 from tissuejax.diagnosis.judgement.mass import amplitude_mass
-from tissuejax.errors import InputError
 from tissuejax.estimation.discrepancy import Part, Series, discrepancy, loading_states
 from tissuejax.estimation.smoothness import USUAL
 
@@ -49,19 +48,6 @@ def test_a_fault_of_a_test_machine_is_rarer_by_hand():
     assert j.posterior[""] == pytest.approx(likely[0])
     assert j.inclusion["slack"] == pytest.approx(likely[1] + likely[2])
     assert j.inclusion["drift"] == pytest.approx(likely[2])
-
-
-def test_what_is_known_of_a_machine_is_how_likely_a_fault_of_it_is():
-    """Of two names with the same evidence, one a fault: where nobody looked at the machine both are as likely, where it
-    was verified the fault has a hundredth of the other's odds. Of a drift one of three forms was weighed."""
-    sets = evidence(weighed([], -20.0), weighed(["slack"], 0.0), weighed(["drift"], 0.0))
-    sets = dataclasses.replace(sets, faults=("slack",))
-    for known, odds in (("verified", 0.01), ("usual", 0.1), ("unchecked", 1.0)):
-        j = judge(sets, Criteria.of_rig(known))
-        assert j.posterior["slack"] / j.posterior["drift"] == pytest.approx(3 * odds)
-    assert Criteria.of_rig("usual") == Criteria()
-    with pytest.raises(InputError, match="knowledge of a rig .*verified"):
-        Criteria.of_rig("good")
 
 
 @pytest.mark.parametrize("fault", [0.1, 1.0])

@@ -10,7 +10,7 @@ import equinox as eqx
 from tissuejax.commands.command import Command, Reply
 from tissuejax.commands.outputs import add_out, effects_of, folder
 from tissuejax.diagnosis.diagnose import diagnose
-from tissuejax.diagnosis.judgement.criteria import RIGS, Criteria
+from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.result import Diagnosis
 from tissuejax.effects.catalogue import effect, effects
 from tissuejax.errors import InputError, unknown
@@ -84,7 +84,7 @@ stopped goes on where it was when the same command is given again.
         parser.add_argument("--effect", action="append", metavar="NAME", help="try only these effects (repeat)")
         parser.add_argument(
             "--rig",
-            choices=RIGS,
+            choices=("usual", *Criteria().rigs),
             default="usual",
             help="of material tests, what is known of the test machine: verified (compliance, clocks and zeros were "
             "measured: a fault is held for 100 times less likely than what a law lacks), usual (10 times), unchecked "

@@ -4,7 +4,7 @@ How much is tried is `effort.Effort`; both together are `numbers.Numbers`. Numbe
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,11 +13,6 @@ from tissuejax.errors import unknown
 from tissuejax.estimation.correlation import MISSTATED
 from tissuejax.estimation.level import OF_NOTE
 from tissuejax.estimation.smoothness import USUAL, Smoothness
-
-# By what is known of a test machine, how likely a fault of it is beside what a law lacks, name for name: how its load
-# train gives, when its channels read and where they count from was measured (as of published recordings, see
-# `Criteria.fault`); nothing is said; nothing of that was ever looked at, and a fault is as likely as anything else.
-RIGS = {"verified": 0.01, "usual": 0.1, "unchecked": 1.0}
 
 
 @dataclass(frozen=True)
@@ -28,10 +23,12 @@ class Criteria:
         sizes: probability that 0, 1, 2, 3 effects of the catalogue act that the base model lacks. Ground: as often
             something as nothing, and rarely much at once; spread evenly over the names, and over the forms of a name.
         fault: how much rarer a fault of a test machine is than what a law lacks, name for name, unless a user says what
-            is known of the machine (`Criteria.of_rig`). Ground: the evidence of
-            85 real samples, no cause read, is likeliest at 0.01 (0.03 and less; `fits/real-panel/rarity.py`), and what
-            is published was looked through for faults. Of a hand or a robot that presses or cuts no such set is known:
-            there both are alike.
+            is known of the machine (`Criteria.of_rig`). Ground: the evidence of 85 real samples, no cause read, is
+            likeliest at 0.01 (0.03 and less; `fits/real-panel/rarity.py`), and what is published was looked through for
+            faults. Of a hand or a robot that presses or cuts no such set of recordings is known: there both are alike.
+        rigs: the same by what else is known of a machine: how its load train gives, when its channels read and where
+            they count from was measured; or nothing of that was ever looked at. Ground: as of published recordings (see
+            `fault`); a fault is as likely as anything else.
         unknown: probability that the discrepancy is far larger than usual in one of its parts: something acts that the
             catalogue doesn't have, beside whatever else acts. Ground: as likely as two effects at once.
         coarse: how many block means with a rest it takes to tell a model that is nearly right from the truth: the
@@ -97,7 +94,8 @@ class Criteria:
     """
 
     sizes: tuple[float, ...] = (0.4, 0.4, 0.15, 0.05)
-    fault: float = RIGS["usual"]
+    fault: float = 0.1
+    rigs: Mapping[str, float] = field(default_factory=lambda: {"verified": 0.01, "unchecked": 1.0})
     unknown: float = 0.1
     coarse: float = 200.0
     shares: Mapping[str, float] = field(
@@ -134,14 +132,16 @@ class Criteria:
 
     @classmethod
     def of_rig(cls, known: str) -> "Criteria":
-        """The usual criteria beside what is `known` of the test machine, a key of `RIGS`.
+        """The usual criteria beside what is `known` of the test machine: "verified", "usual" or "unchecked".
 
         Raises:
             InputError: another word.
         """
-        if known not in RIGS:
-            raise unknown("knowledge of a rig", known, RIGS)
-        return cls(fault=RIGS[known])
+        of = cls()
+        odds = {"usual": of.fault, **of.rigs}
+        if known not in odds:
+            raise unknown("knowledge of a rig", known, odds)
+        return replace(of, fault=odds[known])
 
     def usual(self, rig: bool) -> float:
         """How much of the stress an effect changes, of the rig or of the tissue."""
