@@ -96,6 +96,16 @@ def test_a_page_says_where_the_answer_hangs_on_how_rare_faults_are(relaxing):
     assert not any("Were it as likely" in line for line in judged_sentences.sure(relaxing))
 
 
+def test_a_page_says_where_more_is_laid_to_a_simulation_than_two_of_them_say(relaxing, monkeypatch):
+    answered = relaxing.answered
+    rest = answered.rest() | {"parts": {"mesh": 1.9, "speed": 5.65}}
+    monkeypatch.setattr(type(answered), "rest", lambda self: rest)
+    said = [line for line in judged_sentences.sure(relaxing) if "something else may hide there" in line]
+    assert len(said) == 1
+    assert "speed of the simulation leaves open would have to be 5.7 times" in said[0]
+    assert "a lower `compression`" in said[0]
+
+
 def test_a_page_says_how_often_evidence_of_simulations_says_nothing(relaxing):
     answered = relaxing.answered
     assert not any("Once in" in line for line in judged_sentences.sure(relaxing))

@@ -38,6 +38,7 @@ PARTS = {
 }
 
 SEEN = 1e-5  # of the peak: no sensor tells less, and an amplitude at its bound is rounding
+BEYOND = 2.0  # of the error that two simulations tell: 95 of 100 of a half-normal distribution lie below
 LITTLE = 1e-3  # of the stress: a part that is less is no news
 
 
@@ -188,6 +189,12 @@ def sure(d: Diagnosis) -> list[str]:
             f"To mesh and step of the simulation {100 * j.chosen.numerical:.2g} % of the largest values are laid, and "
             "not to the tissue."
         )
+    for name, finer in (("mesh", "a finer mesh"), ("speed", "a lower `compression`")):
+        if (times := rest["parts"].get(name, 0.0)) > BEYOND:
+            out.append(
+                f"For that {_part(name)} would have to be {times:.1f} times what two simulations say of it: try "
+                f"{finer}, for something else may hide there."
+            )
     if rest["kurtosis"] > 5:
         out.append(
             f"What is left jumps (excess kurtosis {rest['kurtosis']:.0f}): slips, steps or spikes are none of the "
