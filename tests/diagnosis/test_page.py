@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from spring_bench import judged, spring
 
+from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.effort import Effort
 from tissuejax.diagnosis.judgement.judge import judge
 from tissuejax.diagnosis.result import Diagnosis
@@ -94,6 +95,21 @@ def test_a_page_says_where_the_answer_hangs_on_how_rare_faults_are(relaxing):
     shown = replace(relaxing, answered=replace(answered, evidence=evidence, judgement=rare))
     assert any(hint in line and "10 times" in line for line in judged_sentences.sure(shown))
     assert not any("Were it as likely" in line for line in judged_sentences.sure(relaxing))
+
+
+@pytest.mark.parametrize(
+    ("known", "said"),
+    [("verified", "100 times less likely than what a tissue does."), ("usual", ""), ("unchecked", "for as likely as")],
+)
+def test_page_and_record_say_what_was_told_of_the_machine(relaxing, known, said):
+    """Where it decides nothing too: a reader can't know otherwise that somebody has told something."""
+    answered, criteria = relaxing.answered, Criteria.of_rig(known)
+    evidence = replace(answered.evidence, faults=("lag",))
+    told = replace(answered, evidence=evidence, exploration=replace(answered.exploration, criteria=criteria))
+    shown = replace(relaxing, answered=told)
+    lines = [line for line in judged_sentences.sure(shown) if "a fault of the test machine" in line]
+    assert [said in line for line in lines] == ([True] if said else [])
+    assert shown.as_dict()["unusual"] == ({"criteria.fault": criteria.fault} if said else {})
 
 
 def test_a_page_says_where_more_is_laid_to_a_simulation_than_two_of_them_say(relaxing, monkeypatch):

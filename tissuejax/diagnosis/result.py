@@ -11,6 +11,7 @@ from tissuejax.cache import source
 from tissuejax.diagnosis.judgement.answer import Answered
 from tissuejax.diagnosis.judgement.evidence import SetEvidence
 from tissuejax.diagnosis.judgement.judge import Kind, covering
+from tissuejax.diagnosis.judgement.numbers import Numbers
 from tissuejax.diagnosis.locate import Located, locate
 from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.remainder import over_places, remainder
@@ -112,6 +113,7 @@ class Diagnosis:
             "used": USED,
             "sample": self.sample,
             "energy": self.energy,
+            "unusual": Numbers(a.exploration.criteria).unusual(),
             "warnings": list(bench.warnings),
             "seconds": self.seconds,
             "versions": {name: version(name) for name in ("tissuejax", "jax", "numpy", "scipy")}

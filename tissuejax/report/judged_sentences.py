@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+from tissuejax.diagnosis.judgement.criteria import Criteria
 from tissuejax.diagnosis.judgement.judge import Kind, judge
 from tissuejax.diagnosis.refit import Refit
 from tissuejax.diagnosis.result import USED, Diagnosis
@@ -129,18 +130,25 @@ def lead(d: Diagnosis) -> str:
     )
 
 
-def _were_faults_common(d: Diagnosis) -> list[str]:
-    """What would be said if a fault of the machine were as likely beforehand as what tissue does, where it is else."""
+def _how_rare_faults(d: Diagnosis) -> list[str]:
+    """What was held of the machine's faults beforehand, where that is not the usual or decides the answer."""
     criteria, j = d.answered.exploration.criteria, d.answered.judgement
-    if criteria.fault >= 1 or not d.answered.evidence.faults:
+    if not d.answered.evidence.faults:
         return []
+    if criteria.fault >= 1:
+        return [
+            "Beforehand a fault of the test machine was held for as likely as what a tissue does (--rig unchecked)."
+        ]
+    held = (
+        f"Beforehand a fault of the test machine was held for {1 / criteria.fault:.0f} times less likely than what a "
+        "tissue does"
+    )
     other = judge(d.answered.evidence, replace(criteria, fault=1.0))
     if other.kind is j.kind and set(other.names) == set(j.names):
-        return []
+        return [] if criteria.fault == Criteria().fault else [f"{held}."]
     named = f": {joined(list(other.names))}" if other.names else ""
     return [
-        f"Beforehand a fault of the test machine was held for {1 / criteria.fault:.0f} times less likely than what a "
-        f"tissue does. Were it as likely, the answer would be {other.kind.value}{named} ({chance(other.confidence)}); "
+        f"{held}. Were it as likely, the answer would be {other.kind.value}{named} ({chance(other.confidence)}); "
         "say so (--rig unchecked) where nobody has looked at the machine."
     ]
 
@@ -163,7 +171,7 @@ def sure(d: Diagnosis) -> list[str]:
     names = [(joined(list(s.names)) or "nothing at all", p) for s, p in j.alternatives if p > 1e-6][:1]
     if names and j.kind in (Kind.FOUND, Kind.IN_PART):
         out.append(f"Exactly these and no other: {chance(j.exact)}; the next best account is {names[0][0]}.")
-    out += _were_faults_common(d)
+    out += _how_rare_faults(d)
     told = [f"{_over_noise(a.empty, bool(a.bench.held_out))} with {d.energy} alone"]
     if a.chosen.keys:
         named = joined(list(dict.fromkeys(a.bench.candidates[k].name for k in a.chosen.keys)))

@@ -33,6 +33,11 @@ class Numbers:
         """Every number by its path, e.g. "criteria.shares.law", "criteria.sizes.1", "effort.course.rounds"."""
         return numbers_of(self)
 
+    def unusual(self) -> dict[str, float]:
+        """Those that are not as usual, by path; of a table of any numbers, those that the usual one lacks too."""
+        usual = Numbers().all()
+        return {path: value for path, value in self.all().items() if usual.get(path) != value}
+
     def changed(self, path: str, factor: float) -> "Numbers":
         """The same with the number at `path` times `factor`; a count stays one, and at least 1; a share below 1.
 
