@@ -200,7 +200,7 @@ def declared(lower=0.0, upper=INF) -> Any:
 def test_times_lie_between_the_finest_tenth_of_the_sampling_and_three_lengths():
     """Steps of 0.02 in a tenth of the time, then of 1; another channel is longer and sampled more coarsely."""
     uneven = np.concatenate([[5.0], 5.0 + np.cumsum(np.repeat([0.02, 1.0], [20, 80]))])
-    effects = (SimpleNamespace(name="plain"), SimpleNamespace(name="e", times=("t1", "t2", "t3")))
+    effects = (SimpleNamespace(name="plain", times=()), SimpleNamespace(name="e", times=("t1", "t2", "t3")))
     paths = [f"effects.e.t{i}" for i in (1, 2, 3)]
     known = dict(zip(paths, (declared(), declared(0.5, 20.0), declared(400.0, 900.0)), strict=True))
     even, single, still = np.arange(0.0, 121.0, 2.0), np.array([0.0]), np.array([3.0, 3.0])

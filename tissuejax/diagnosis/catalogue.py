@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from tissuejax.diagnosis.bench import Candidate, Free
 from tissuejax.effects.catalogue import effects
-from tissuejax.effects.form import Offer, Sizes
+from tissuejax.effects.form import Form, Offer, Sizes
 from tissuejax.model import Model
 from tissuejax.parameters import Parameter
 
@@ -41,7 +41,7 @@ class Entry(Offer):
         known = {p.name: p for p in self.effect.parameters}
         free, start, candidates = {}, {}, []
         for form in self.forms:
-            amplitudes, shapes, held, paths = [], [], [], {}
+            amplitudes, shapes, held, paths, grid = [], [], [], {}, self.scanned_in(form)
             for name in form.free:
                 p, shape = known[name], name not in self.effect.amplitudes
                 own = [f"{prefix}.{name}.{r}" for r in fitted] if name in form.each else [f"{prefix}.{name}"]
@@ -50,7 +50,7 @@ class Entry(Offer):
                 if name in form.each:
                     held += [f"{prefix}.{name}.{r}" for r in held_out]
                 for path in (*own, *(h for h in held if h.startswith(f"{prefix}.{name}."))):
-                    f = limits(p, shape, form.grid.get(name, self.effect.grid.get(name, ())), form.reach)
+                    f = limits(p, shape, grid.get(name, self.effect.grid.get(name, ())), form.reach)
                     if name in self.effect.shares:
                         f = replace(f, whole=prefix)
                     if name in self.effect.misjudged:
@@ -66,7 +66,7 @@ class Entry(Offer):
                     self.title,
                     tuple(amplitudes),
                     tuple(shapes),
-                    settings(form.grid, paths),
+                    settings(grid, paths),
                     form=form.name,
                     held=tuple(held),
                     nominated=form.nominated,
@@ -87,11 +87,18 @@ class Entry(Offer):
             name = path.split(".")[2]
             lower, upper, start[path] = self.ranges.get(name, (f.lower, f.upper, start[path]))
             scale, prior = self.scales.get(name, f.scale), self.priors.get(name, f.prior)
+            if name in self.effect.times:
+                lower, start[path] = max(lower, self.quickest), max(start[path], self.quickest)
             free[path] = replace(f, lower=lower, upper=upper, scale=scale, prior=prior)
         for i, c in enumerate(candidates):
             beside = [candidates[j].key for j in range(len(candidates)) if self.near(i, j)]
             candidates[i] = replace(c, beside=tuple(beside))
         return free, start, candidates
+
+    def scanned_in(self, form: Form) -> dict[str, tuple[float, ...]]:
+        """Values of a form's shapes that are scanned, no time among them that is quicker than what is seen here."""
+        seen = {n: tuple(dict.fromkeys(max(v, self.quickest) for v in form.grid.get(n, ()))) for n in self.effect.times}
+        return {name: seen.get(name, values) for name, values in form.grid.items()}
 
     def near(self, i: int, j: int) -> bool:
         """Whether forms i and j are tried beside each other: next in the order, or one freeing all the other frees.

@@ -31,7 +31,7 @@ from tissuejax.diagnosis.periodogram import lines
 from tissuejax.effects.form import Sizes
 from tissuejax.effects.material_test import MaterialTest
 from tissuejax.energies.energy import Energy
-from tissuejax.estimation.series import Series
+from tissuejax.estimation.series import Series, finest
 from tissuejax.experiments.catalogue import experiment
 from tissuejax.experiments.homogeneous import nominal_stress
 from tissuejax.model import Model
@@ -122,6 +122,7 @@ class MaterialBench(Bench):
             session=max(ends),
             recording=max(float(np.ptp(t.time)) for t in tests.values()),
             step=max(float(np.median(np.diff(s.time))) for s in segments),
+            finest=finest(s.time for s in segments),
         )
         bench.sizes = sizes
         found = [e for e in entries(sizes) if names is None or e.title in names]

@@ -35,6 +35,7 @@ from tissuejax.effects.catalogue import effects
 from tissuejax.effects.form import Probed
 from tissuejax.energies.catalogue import volumetric
 from tissuejax.energies.energy import Energy
+from tissuejax.estimation.series import finest
 from tissuejax.experiments.predictor import predictor
 from tissuejax.experiments.probing_setup import DENSITY, site
 from tissuejax.model import Model
@@ -123,7 +124,7 @@ class ProbingBench(Bench):
         forces = [np.asarray(s.time, float) for s in self.segments if s.channel == "force"]
         forces = forces or [np.asarray(s.time, float) for s in self.segments]
         longest, step = max(np.ptp(t) for t in forces), max(np.median(np.diff(t)) for t in forces)
-        found = probing_entries(Probed(mu, height, session, float(longest), float(step)))
+        found = probing_entries(Probed(mu, height, session, float(longest), float(step), finest(forces)))
         entries = [e for e in found if names is None or e.effect.name in names]
         whole = Model(self.model.energy, None, tuple(e.effect for e in entries)).across(recordings)
         self.entries: dict[str, Entry] = {e.effect.name: e for e in entries}

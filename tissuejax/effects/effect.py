@@ -40,6 +40,7 @@ class Effect(eqx.Module):
             `diagnosis.probing_offered.Pressed`. Where it is lacking the effect is another strain energy by its deeds,
             or nothing.
         remedy: what to do where it is named and has no parameters to fit, one sentence.
+        times: of its parameters, s, the ones that no recording shows below its sampling nor far beyond its length.
         timed: parameters that act in time, so that they mean nothing where no times were recorded.
         slow: of these, the ones that are another strain energy by their deeds where all is loaded at one rate and never
             held: there the time is a function of the strain.
@@ -84,6 +85,7 @@ class Effect(eqx.Module):
     shares: ClassVar[tuple[str, ...]] = ()
     needs: ClassVar[Mapping[str, str]] = {}
     remedy: ClassVar[str] = ""
+    times: ClassVar[tuple[str, ...]] = ()
     timed: ClassVar[tuple[str, ...]] = ()
     slow: ClassVar[tuple[str, ...]] = ()
     grid: ClassVar[Mapping[str, tuple[float, ...]]] = {}

@@ -84,7 +84,8 @@ class Sizes:
         force: largest force, N: a rig stiffens within it.
         session: time from the first recording to the last, s: drifts die out within it.
         recording: duration of the longest, s.
-        step: between samples, the longest, s: faster than that nothing is seen.
+        step: between samples, the longest, s: faster than that nothing is seen in some recording.
+        finest: between samples of the most finely sampled one, s: faster than that nothing is seen in any.
     """
 
     energy: float
@@ -93,6 +94,7 @@ class Sizes:
     session: float
     recording: float
     step: float = 0.1
+    finest: float = 0.0
 
     @property
     def stretched(self) -> float:
@@ -110,6 +112,7 @@ class Probed:
         session: from the first recording to the end of the last, s.
         recording: duration of the longest, s.
         step: between samples of the force, the longest, s.
+        finest: between samples of the most finely sampled one, s: faster than that nothing is seen in any.
     """
 
     modulus: float
@@ -117,6 +120,7 @@ class Probed:
     session: float
     recording: float = 10.0
     step: float = 0.05
+    finest: float = 0.0
 
     @property
     def energy(self) -> float:
@@ -136,6 +140,7 @@ class Offer:
         scales: by parameter, a step that is plainly visible here, where that is not the declared one.
         priors: by parameter, mean and standard deviation of what it may be here.
         ranges: by parameter, (lower, upper, start) of what can be seen here.
+        quickest: the shortest of its times (`Effect.times`) that can be seen here, s.
     """
 
     effect: "Effect"
@@ -145,6 +150,7 @@ class Offer:
     scales: Mapping[str, float] = field(default_factory=dict)
     priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     ranges: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    quickest: float = 0.0
 
     @classmethod
     def whole(cls, effect: "Effect") -> "Offer":

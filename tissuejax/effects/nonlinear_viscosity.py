@@ -48,7 +48,8 @@ class NonlinearViscosity(Effect):
         grid = {"tau": (0.1 * sizes.recording, sizes.recording), "stress": (load,), "exponent": (3.0,)}
         free = ("g", "tau", "stress", "exponent")
         form = Form("load-dependent", free, grid, nominated=False, beside=("one time", "two times"))
-        return Offer(cls(), (form,), "viscoelasticity", ranges={"stress": (0.1 * load, 10 * load, load)})
+        ranges = {"stress": (0.1 * load, 10 * load, load)}
+        return Offer(cls(), (form,), "viscoelasticity", ranges=ranges, quickest=sizes.finest)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -81,15 +81,14 @@ class Viscoelasticity(Effect):
             Form("two times of the nominal stress", (*two, "nominal"), pairs | nominal),
             Form("three times of the nominal stress", (*three, "nominal"), third | nominal, nominated=False),
         )
-        return Offer(cls(terms=3), forms)
+        return Offer(cls(terms=3), forms, quickest=sizes.finest)
 
     @classmethod
     def in_probings(cls, sizes: Probed) -> Offer:
         """See `Effect.in_probings`."""
         one = Form("one time", ("g1", "tau1"), {"tau1": (0.4, 4.0)}, nominated=False)
-        return Offer(
-            cls(terms=2), (one, Form("two times", ("g1", "g2", "tau1", "tau2"), {"tau1": (0.5,), "tau2": (6.0,)}))
-        )
+        two = Form("two times", ("g1", "g2", "tau1", "tau2"), {"tau1": (0.5,), "tau2": (6.0,)})
+        return Offer(cls(terms=2), (one, two), quickest=sizes.finest)
 
     @classmethod
     def in_cuts(cls) -> Offer:

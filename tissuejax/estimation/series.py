@@ -4,13 +4,15 @@ A fit's residuals and a diagnosis' bench are cut in the same way, so that a samp
 is one number.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import ArrayLike, Bool, Float, Int
 
 from tissuejax.recordings.recording import Recording, Sample
+
+FINEST = 0.1  # share of the samples, those closest together, that tell of the shortest times
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,15 @@ def stretched(recording: Recording, channel: str, component: int) -> Driven:
 def by_axis(channel: str, width: int, component: int) -> str:
     """A component's name: nothing for a scalar channel, else "axis 1", "axis 2", ..."""
     return f"axis {component + 1}" if width > 1 else ""
+
+
+def finest(times: Iterable[Float[np.ndarray, " _"]]) -> float:
+    """The steps, in s, between the samples of the most finely sampled series: nothing quicker is seen.
+
+    Where sampling is uneven that of its finest tenth counts: a ramp may be sampled a hundred times as often as a hold.
+    """
+    steps = [float(np.quantile(np.diff(t), FINEST)) for t in times if len(t) > 1 and t[-1] > t[0]]
+    return min(steps, default=0.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,35 +4,28 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from tissuejax.estimation.series import finest
 from tissuejax.estimation.weights import Weights
 from tissuejax.experiments.predictor import Predictor
 from tissuejax.recordings.recording import Recording
 
 LENGTHS = 3.0  # of the longest recording: a slower time is a straight line in it
-FINEST = 0.1  # share of the samples, those closest together, that tell of the shortest times
 LOADED = 4.0  # standard errors of the first samples' mean from which a recording begins under load
 FIRST = 5  # samples
 REST = 0.02  # of the largest drive: nothing is done yet
 
 
 def time_bounds(predictor: Predictor) -> dict[str, tuple[float, float]]:
-    """(lower, upper) of the relaxation times of a model, from the sampling and the length of its recordings, s.
-
-    Where sampling is uneven that of its finest tenth counts: a ramp may be sampled a hundred times as often as a hold.
-    """
-    steps, spans = [], []
-    for name in predictor.names:
-        for channel in predictor.sample.recordings[name].channels.values():
-            time = np.asarray(channel.time, float)
-            if len(time) > 1 and time[-1] > time[0]:
-                steps.append(float(np.quantile(np.diff(time), FINEST)))
-                spans.append(float(time[-1] - time[0]))
-    if not steps:
+    """(lower, upper) of the relaxation times of a model, from the sampling and the length of its recordings, s."""
+    recordings = [predictor.sample.recordings[name] for name in predictor.names]
+    series = [np.asarray(c.time, float) for r in recordings for c in r.channels.values()]
+    shortest, longest = finest(series), max((float(t[-1] - t[0]) for t in series if len(t)), default=0.0)
+    if not shortest:
         return {}
     found = {}
     for path in times(predictor):
         declared = predictor.model.parameters[path]
-        lower, upper = max(min(steps), declared.lower), min(LENGTHS * max(spans), declared.upper)
+        lower, upper = max(shortest, declared.lower), min(LENGTHS * longest, declared.upper)
         if lower < upper:
             found[path] = lower, upper
     return found
@@ -40,9 +33,7 @@ def time_bounds(predictor: Predictor) -> dict[str, tuple[float, float]]:
 
 def times(predictor: Predictor) -> list[str]:
     """Paths of relaxation times."""
-    return [
-        f"effects.{effect.name}.{name}" for effect in predictor.model.effects for name in getattr(effect, "times", ())
-    ]
+    return [f"effects.{effect.name}.{name}" for effect in predictor.model.effects for name in effect.times]
 
 
 def spread(bounds: Mapping[str, tuple[float, float]]) -> dict[str, float]:
