@@ -45,3 +45,21 @@ def test_stress_with_prony_drain_and_both_kinds_of_softening(rng):
         assert np.allclose(after.relaxed[0][i][:n], q[:n])
         assert np.allclose(after.drained[0][i][:n], qd[:n])
     assert np.allclose(after.greatest[:n], m[:n])
+
+
+def test_a_stiffer_place_softens_as_tissue_of_that_stiffness_does(rng):
+    """Thrice the energy that it has seen and thrice the energy now: it loses the same share, of thrice the stress."""
+    scene = cases.plain(box((0.02, 0.02, 0.02), (2, 2, 2)), np.arange(2.0), order=2)
+    full = scene.put({"tissue.damage": Damage(*(jnp.asarray(x) for x in (0.3, 40.0, 0.4, 0.1)))})
+    mesh = internal.mesh(scene)
+    stiff = mesh._replace(stiffness=3.0 * mesh.stiffness)
+    C = internal.cauchy_green(jnp.eye(3)[:, :, None] + 0.1 * jnp.asarray(rng.normal(size=(3, 3, mesh.stiffness.size))))
+    most = jnp.asarray(rng.uniform(0, 200, mesh.stiffness.size))
+    S, after = internal.stress(full, mesh, C, internal.History(None, most), 0.05)
+    thrice, then = internal.stress(full, stiff, C, internal.History(None, 3.0 * most), 0.05)
+    n = len(scene.body.cells)
+    for one, other in zip(S, thrice, strict=True):
+        assert np.allclose(other[:n], 3.0 * one[:n], rtol=1e-9, atol=1e-9)
+    assert np.allclose(then.greatest[:n], 3.0 * after.greatest[:n])
+    assert np.any(after.greatest[:n] > most[:n]), "some are loaded"
+    assert np.any(after.greatest[:n] == most[:n]), "others unloaded"
