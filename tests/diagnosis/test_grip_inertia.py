@@ -64,7 +64,7 @@ FEW = ("grip-inertia", "clock-lag", "viscoelasticity", "load-cell-bend", "drift"
 @pytest.mark.parametrize(
     ("turn", "noise", "tried"),
     [
-        (0.08, 0.05, FEW),
+        pytest.param(0.08, 0.05, FEW, marks=pytest.mark.slow),
         pytest.param(0.08, 0.05, None, marks=pytest.mark.slow),
         pytest.param(0.03, 0.005, None, marks=pytest.mark.slow),
     ],

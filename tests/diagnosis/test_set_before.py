@@ -106,6 +106,7 @@ def names(found: Diagnosis) -> list[str]:
     return [e["name"] for e in found.as_dict()["effects"]]
 
 
+@pytest.mark.slow
 def test_zeros_that_differ_by_some_thousandths_of_strain_are_nothing_and_a_gap_is_slack():
     """Half a per cent of the range, and 2 % of strain: at so little noise (0.2 % of the peak) a gap shows by where it
     ends, and its slope at nothing ends elsewhere."""
@@ -134,6 +135,7 @@ def swung(late: float) -> Sample:
     return Sample("swung", recordings)
 
 
-@pytest.mark.parametrize(("late", "named"), [pytest.param(0.7, [], marks=pytest.mark.slow), (3.0, ["clock-lag"])])
+@pytest.mark.slow
+@pytest.mark.parametrize(("late", "named"), [(0.7, []), (3.0, ["clock-lag"])])
 def test_a_force_that_is_less_than_a_sample_late_is_nothing_and_three_samples_late_a_lag(late, named):
     assert names(tj.diagnose(swung(late), "neo-hookean")) == named

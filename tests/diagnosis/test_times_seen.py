@@ -71,6 +71,7 @@ def test_the_recording_that_is_sampled_most_finely_tells():
     assert finest([np.array([1.0]), np.array([2.0, 2.0])]) == 0.0
 
 
+@pytest.mark.slow
 def test_a_diagnosis_states_no_time_below_the_sampling():
     """A dashpot has no time: the quickest relaxation that the samples can show stands for it, and nothing quicker."""
     lasts = {"quick": 4.0, "middle": 12.0, "slow": 40.0}
