@@ -18,9 +18,9 @@ DRIVES = {
 STD = 15.0
 
 
-def relaxing(e):
+def relaxing(e, elastic=None):
     """An exponential law that relaxes with 0.7 and 6 s: neither its power nor its times are the description's."""
-    elastic = 3000 * (np.exp(3 * e) - 1) / 3
+    elastic = 3000 * (np.exp(3 * e) - 1) / 3 if elastic is None else elastic
     out = elastic.copy()
     for g, tau in ((0.2, 0.7), (0.15, 6.0)):
         kept = np.exp(-0.04 / tau)
@@ -33,6 +33,16 @@ def slack(e):
     return 3000 * (np.exp(3 * np.maximum(e - 0.03, 0)) - 1) / 3
 
 
+def stiffening(e):
+    """Tangents 25 times as large at the end as at the beginning, and the same relaxation."""
+    return relaxing(e, 3000 * (np.exp(3.2 * e / 0.3) - 1) / 24)
+
+
+def knee(e):
+    """Soft to a strain of 0.15, then 20 kPa a strain, over a hundredth: a sheet whose fibres come taut."""
+    return relaxing(e, 200 * np.logaddexp(0, (e - 0.15) / 0.01))
+
+
 def drawn(kind, rng):
     w = rng.normal(size=1300)
     if kind == "white":
@@ -43,7 +53,7 @@ def drawn(kind, rng):
     return lfilter([np.sqrt(1 - rho**2)], [1, -rho], w)[-625:]
 
 
-@pytest.mark.parametrize("response", [relaxing, slack])
+@pytest.mark.parametrize("response", [relaxing, slack, stiffening, knee])
 @pytest.mark.parametrize("kind", ["white", "0.5", "0.8", "0.9", "0.95", "moving average"])
 def test_levels_within_15_percent_of_the_truth(kind, response):
     found = []
@@ -51,6 +61,19 @@ def test_levels_within_15_percent_of_the_truth(kind, response):
         rng = np.random.default_rng(trial)
         given = [Response(TIME, e, response(e) + STD * drawn(kind, rng)) for e in DRIVES.values()]
         found.append([x.std for x in levels(given)])
+    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(STD, rel=0.15)
+
+
+def test_a_fast_ramp_with_many_samples_before_a_long_hold_with_few():
+    """What relaxes within the ramp's time is described at the ramp's sampling, not at a hundredth of the recording."""
+    time = np.concatenate([np.arange(0, 0.1, 0.004), 0.1 + np.geomspace(0.004, 40, 75)])
+    e = np.interp(time, [0, 0.1, 41], [0, 0.3, 0.3])
+    ramps = np.minimum(time, 0.1)  # a stress of rate 1 during the ramp, fading over tau, in closed form
+    faded = [tau * (np.exp((ramps - time) / tau) - np.exp(-time / tau)) for tau in (0.03, 0.4)]
+    y = 6e3 * (0.4 * e + 3 * (0.3 * faded[0] + 0.3 * faded[1]))
+    found = [
+        levels([Response(time, e, y + STD * np.random.default_rng(k).normal(size=len(time)))])[0].std for k in range(6)
+    ]
     assert np.sqrt(np.mean(np.square(found))) == pytest.approx(STD, rel=0.15)
 
 

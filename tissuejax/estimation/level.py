@@ -2,13 +2,14 @@
 
 Differences between neighbours see white noise only: noise that is correlated, filtered or quantised differs little from
 one sample to the next and comes out too small. So the response is taken out first, by a description that knows no
-particular material: powers of the drive, each at once and fading over several times (the leading terms of a
-Green-Rivlin expansion). What is left holds the noise and a smooth rest; the two are told apart by their spectra
-(`estimation.correlation`), and what the description took of slow noise is put back.
+particular material: any smooth law of the drive at once (cubic splines, for powers can't follow one that stiffens
+tenfold), and powers of it that fade over several times (the leading terms of a Green-Rivlin expansion). What is left
+holds the noise and a smooth rest; the two are told apart by their spectra (`estimation.correlation`), and what the
+description took of slow noise is put back.
 
-Sources: Green and Rivlin 1957, Arch. Ration. Mech. Anal. 1:1 (multiple-integral expansion); Gasser, Sroka and
-Jennen-Steinmetz 1986, Biometrika 73:625 (differences, for short series); Widrow and Kollar 2008, Quantization Noise,
-ch. 1 (q^2/12).
+Sources: Green and Rivlin 1957, Arch. Ration. Mech. Anal. 1:1 (multiple-integral expansion); de Boor 1978, A Practical
+Guide to Splines, ch. IX; Gasser, Sroka and Jennen-Steinmetz 1986, Biometrika 73:625 (differences, for short series);
+Widrow and Kollar 2008, Quantization Noise, ch. 1 (q^2/12).
 """
 
 import math
@@ -20,11 +21,16 @@ from jaxtyping import Float
 
 from tissuejax.estimation.correlation import LEAST, Series, estimate
 from tissuejax.estimation.noise import Noise
+from tissuejax.estimation.series import finest
 
 OF_NOTE = 0.005  # of the peak: half of what load cells are verified to (class 1 of ISO 7500-1)
 THIRD = np.array([1.0, -3.0, 3.0, -1.0])
+PIECES = (3, 6)  # of the law of the drive at once, between its least and its largest: for few and for many samples
+EACH = 25  # samples a piece
 POWERS = (1, 2, 3)
-FADES = (0.012, 0.08, 0.5)  # of the recording: times over which the response forgets
+LONGEST, SHORTEST = 0.5, 0.012  # of the recording: times over which the response forgets
+APART = 6.5  # of one such time over the next
+SEEN = 10.0  # finest steps that the shortest of them lasts where steps are uneven
 KINK = 0.25  # of the fastest drive: change of rate from which the response may turn sharply
 LEVELS = 0.25  # distinct values a sample below which a series is called quantised
 SMOOTH = 2.0  # what is left over noise, from which the smooth part may itself be slow noise
@@ -107,27 +113,44 @@ def kinks(time: Float[np.ndarray, " n"], drive: Float[np.ndarray, " n"], width: 
 
 
 def description(time: Float[np.ndarray, " n"], drive: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n k"]:
-    """Orthonormal columns that span a response to the drive: powers of it, at once and fading, a level and a slope."""
-    span = time[-1] - time[0]
+    """Orthonormal columns that span a response to the drive: a law of it at once, fading powers of it, and a slope."""
     e = (drive - drive[0]) / (float(np.max(np.abs(drive - drive[0]))) or 1.0)
-    columns = [np.ones_like(time), (time - time[0]) / span]
-    for power in POWERS:
-        columns.append(e**power)
-        columns += [_fading(time, e**power, share * span) for share in FADES]
-    columns = np.stack(columns, 1)
+    powers = np.stack([e**power for power in POWERS], 1)
+    faded = [fading(time, powers, tau) for tau in fades(time)]
+    columns = np.concatenate([(time - time[0])[:, None], law(e), *faded], axis=1)
     u, s, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0).clip(1e-300), full_matrices=False)
     return u[:, s > 1e-6 * s[0]]
 
 
-def _fading(time: np.ndarray, x: np.ndarray, tau: float) -> np.ndarray:
-    """Part of x that was imposed within about tau: increments that fade; exact between samples of a straight x."""
-    from scipy.signal import lfilter  # it takes half a second to load, and few recordings come without a level
+def law(e: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n k"]:
+    """Cubic B-splines over the range of e, which hold every polynomial to the third power; ones where e is constant."""
+    from scipy.interpolate import BSpline  # it takes a while to load, and few recordings come without a level
 
-    even = np.linspace(time[0], time[-1], len(time))
-    step = even[1] - even[0]
-    keep = math.exp(-step / tau)
-    fresh = np.diff(np.interp(even, time, x), prepend=x[0]) * (1 - keep) / (step / tau)
-    return np.interp(time, even, lfilter([1.0], [1.0, -keep], fresh))
+    low, high = float(np.min(e)), float(np.max(e))
+    if high <= low:
+        return np.ones((len(e), 1))
+    pieces = int(np.clip(len(e) // EACH, *PIECES))
+    knots = np.concatenate([[low] * 3, np.linspace(low, high, pieces + 1), [high] * 3])
+    return BSpline.design_matrix(e, knots, 3).toarray()
+
+
+def fades(time: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
+    """Times over which the response forgets, s, the longest first: to where the sampling is finest."""
+    span = float(time[-1] - time[0])
+    shortest = min(SHORTEST * span, SEEN * finest([time]))
+    steps = max(math.ceil(math.log(LONGEST * span / shortest) / math.log(APART)), 1)
+    return np.geomspace(LONGEST * span, shortest, steps + 1)
+
+
+def fading(time: Float[np.ndarray, " n"], x: Float[np.ndarray, "n k"], tau: float) -> Float[np.ndarray, "n k"]:
+    """Part of x that was imposed within about tau: increments that fade; exact between samples of a straight x."""
+    step = np.maximum(np.diff(time) / tau, 1e-12)
+    kept = np.exp(-step)
+    fresh = np.diff(x, axis=0) * (-np.expm1(-step) / step)[:, None]
+    out = np.zeros_like(x)
+    for k in range(len(step)):
+        out[k + 1] = kept[k] * out[k] + fresh[k]
+    return out
 
 
 def levels(responses: Sequence[Response]) -> list[Level]:
