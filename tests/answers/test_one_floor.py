@@ -21,9 +21,18 @@ def test_chi_square_per_sample_is_that_of_the_diagnosis(recorded):
         sample = replace(sample, recordings=blank)
     fit = tj.fit(sample, "reduced-polynomial-2")
     before = tj.diagnose(sample, "reduced-polynomial-2", holdout=(), effects=("slack",)).as_dict()["before"]
+    ours = theirs = 0.0
     for key, score in fit.channels.items():
         recording, channel = key.split("/")
-        said = before[recording][channel]["chi2_per_sample"]
-        # where none was recorded a fit weighs recordings alike, and a diagnosis by their own noise: parameters differ
-        assert score.chi2_per_sample == pytest.approx(said, rel=1e-6 if recorded else 5e-3)
+        said = before[recording][channel]
+        assert score.rmse**2 / score.chi2_per_sample == pytest.approx(
+            said["rmse"] ** 2 / said["chi2_per_sample"], rel=1e-9
+        )
+        assert score.n == said["n"]
+        if recorded:
+            assert score.chi2_per_sample == pytest.approx(said["chi2_per_sample"], rel=1e-6)
         assert score.chi2_per_sample > 100  # it relaxes, and the law does not
+        ours, theirs = ours + score.n * score.chi2_per_sample, theirs + said["n"] * said["chi2_per_sample"]
+    # where none was recorded a fit weighs recordings alike, and a diagnosis by their own noise: the same chi-squares of
+    # parameters that differ, of which the diagnosis' have the least sum
+    assert 1 - 1e-9 < ours / theirs < 1.001

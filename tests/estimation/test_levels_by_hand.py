@@ -7,7 +7,18 @@ import pytest
 
 from tissuejax.estimation import level
 from tissuejax.estimation.correlation import Estimate, Series
-from tissuejax.estimation.level import Level, Response, description, kinks, levels, resolution, rough
+from tissuejax.estimation.level import (
+    Level,
+    Response,
+    description,
+    fades,
+    fading,
+    kinks,
+    law,
+    levels,
+    resolution,
+    rough,
+)
 from tissuejax.estimation.noise import Noise
 
 T = np.arange(80.0)
@@ -109,33 +120,48 @@ DRIVES = {
 
 
 @pytest.mark.parametrize("name", DRIVES)
-def test_a_description_spans_powers_of_the_drive_at_once_and_fading(name):
-    """Of a ramp these are a cubic and three exponentials; of a ramp and a hold, a line and three exponentials more that
-    go on where the ramp ends."""
+def test_a_description_spans_a_law_of_the_drive_at_once_and_fading_powers(name):
+    """Of a ramp these are a cubic of three pieces and three exponentials; of a ramp and a hold, a line and three
+    exponentials more that go on where the ramp ends. The law is spanned by truncated powers here."""
     time, drive = 3.0 + 0.5 * T, DRIVES[name]
     e = (drive - drive[0]) / (np.max(np.abs(drive - drive[0])) or 1.0)
-    columns = [np.ones(80), T / 79]
+    knots = np.min(e) + np.ptp(e) * np.array([1 / 3, 2 / 3])
+    columns = [np.ones(80), T / 79, *(np.maximum(e - k, 0) ** 3 * (np.ptp(e) > 0) for k in knots)]
     for power in (e, e**2, e**3):
-        columns += [power, *(convolved(time, power, share * 39.5) for share in (0.012, 0.08, 0.5))]
+        columns += [power, *(convolved(time, power, share * 39.5) for share in (0.012, math.sqrt(0.006), 0.5))]
     kept = [c / np.linalg.norm(c) for c in columns if np.any(c)]
     left, size, _ = np.linalg.svd(np.stack(kept, 1), full_matrices=False)
     left = left[:, size > 1e-6 * size[0]]
-    assert left.shape[1] == {"ramp": 7, "hold": 11, "cycle": 14, "rest": 2}[name]
+    assert left.shape[1] == {"ramp": 9, "hold": 13, "cycle": 16, "rest": 2}[name]
     u = description(time, drive)
     assert u.shape == left.shape
     np.testing.assert_allclose(u @ u.T, left @ left.T, atol=1e-7)
     np.testing.assert_allclose(u.T @ u, np.eye(len(u.T)), atol=1e-12)
 
 
-def test_what_fades_is_taken_at_even_times_and_read_off_between_them():
-    """Of a straight drive, at times that grow sparse: 1 - exp(-t / tau) to the error of chords."""
-    time = np.concatenate([np.linspace(0.0, 1.0, 150, endpoint=False), np.linspace(1.0, 4.0, 251)])
-    for tau in (0.3, 2.0):
-        found = level._fading(time, 2.0 * time, tau)
-        bound = 2.0 / tau * 0.01**2 / 8
-        np.testing.assert_allclose(found, 2.0 * tau * (1 - np.exp(-time / tau)), atol=1.05 * bound)
-    even = level._fading(T, 2.0 * T, 5.0)
-    np.testing.assert_allclose(even, 10.0 * (1 - np.exp(-T / 5.0)), rtol=1e-12)
+@pytest.mark.parametrize(("n", "columns"), [(64, 6), (99, 6), (100, 7), (125, 8), (149, 8), (150, 9), (1000, 9)])
+def test_a_law_has_a_piece_every_25_samples_from_three_to_six(n, columns):
+    e = np.linspace(-0.2, 0.9, n)
+    b = law(e)
+    assert b.shape == (n, columns)
+    np.testing.assert_allclose(b.sum(1), 1.0)
+    cubic = np.linalg.lstsq(b, e**3 - e, rcond=None)[0]
+    np.testing.assert_allclose(b @ cubic, e**3 - e, atol=1e-12)
+
+
+def test_what_fades_is_exact_however_uneven_the_samples_of_a_straight_drive_lie():
+    """Of a straight drive 1 - exp(-t / tau), and of two samples at one time no second one."""
+    time = np.concatenate([np.linspace(0.0, 1.0, 150, endpoint=False), [1.0], np.geomspace(1.0, 4.0, 25)])
+    for tau in (0.003, 0.3, 2.0):
+        found = fading(time, np.stack([2.0 * time, -time], 1), tau)
+        np.testing.assert_allclose(found[:, 0], 2.0 * tau * (1 - np.exp(-time / tau)), rtol=1e-9, atol=1e-15)
+        np.testing.assert_allclose(found[:, 1], -found[:, 0] / 2, rtol=1e-12)
+
+
+def test_the_times_over_which_it_fades_go_down_to_ten_of_the_finest_steps():
+    np.testing.assert_allclose(fades(0.5 * T), [0.5 * 39.5, math.sqrt(0.006) * 39.5, 0.012 * 39.5])
+    ramp = np.concatenate([np.arange(0.0, 0.1, 0.004), [1.0, 4.0, 10.0, 40.0]])  # 10 steps last 0.04 s
+    np.testing.assert_allclose(fades(ramp), 20.0 * 500.0 ** -np.linspace(0, 1, 5))
 
 
 @pytest.fixture
@@ -187,7 +213,7 @@ def test_series_of_64_samples_are_long_and_in_their_order(told, rng):
     assert [found[i].std for i in (0, 2)] == [rough(y[:63]), rough(y[:20])]
     assert (found[0].noise, found[0].left) == (Noise(), 0.0)
     assert (found[1].noise.share, found[3].noise.share) == pytest.approx((0.0, 0.5))
-    assert found[1].std == pytest.approx(rough(y[:64]) / math.sqrt(1 - 14 / 64), rel=1e-9)
+    assert found[1].std == pytest.approx(rough(y[:64]) / math.sqrt(1 - 16 / 64), rel=1e-9)
     assert found[3].std > 3.0 * rough(y)
 
 
@@ -201,7 +227,7 @@ def test_a_series_without_differences_is_measured_by_its_rest(told, values, unit
     ((series,), _) = asked[0]
     unit = unit or 1e-3 * found.left
     assert np.std(series.values) == pytest.approx(found.left / unit, rel=1e-12)
-    assert found.std == pytest.approx(max(unit / math.sqrt(1 - 7 / 80), found.resolution / math.sqrt(12)), rel=1e-9)
+    assert found.std == pytest.approx(max(unit / math.sqrt(1 - 9 / 80), found.resolution / math.sqrt(12)), rel=1e-9)
 
 
 def test_noise_is_at_least_that_of_rounding(told):
